@@ -1,8 +1,8 @@
 """Entry point of the `vibench` command, with a fast path for `vibench stop`.
 
 The drive stays on until `vibench stop` acts, and loading all libraries takes half a second of processor time.
-This module therefore imports only the standard library. Special cases, and operating systems other than
-Linux, use the complete command.
+This module therefore imports only the standard library. In special cases, and on operating systems other than
+Linux, the complete command is used.
 """
 
 import gc
@@ -26,12 +26,12 @@ class RunningProgram:
         self.is_alive = is_alive
         try:
             with open(path, "rb") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
-                self._facts = file.read()  # read immediately: the program may remove the file
+                self._facts = file.read()  # read at once, before the program can remove the file
         except OSError:
             self._facts = b""
 
     def fact(self, name: str) -> str:
-        """Return a field of the program's announcement; empty if unknown."""
+        """Return a field of the program's announcement; empty if the field is unknown."""
         import json
 
         try:
@@ -53,9 +53,9 @@ def main() -> None:
         code = None if request is None else stop_programs(*request)
         if code is not None:
             sys.exit(code)
-    # pydantic would search every installed package for plug-ins; none is used here.
+    # Keep pydantic from searching every installed package for plug-ins: vibench uses none.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    gc.set_threshold(10_000)  # imports leave little garbage; collecting it took 1/5 of the start-up time
+    gc.set_threshold(10_000)  # collect garbage less often: this took 1/5 of the start-up time
     from vibench.cli import main as run_command
 
     run_command()
@@ -113,7 +113,7 @@ def running_programs() -> Iterator[RunningProgram]:
         if not start.startswith(f"{boot}_") and look():
             raise OSError("on another computer")
         program = RunningProgram(path, pid, start, look)
-        # Any other program runs in a container, or may have ended with an earlier boot of this computer.
+        # Include programs in other containers, and those that ended before the last boot of this computer.
         if is_here or look() or program.fact("computer") == os.uname().nodename:
             yield program
 

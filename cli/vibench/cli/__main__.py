@@ -1,12 +1,13 @@
 """The `vibench` command: the table of commands, and how their errors are reported.
 
-Listing the commands imports none of them; each is imported when it is called.
+Listing the commands imports no command; each command is imported when it is called.
 """
 
 import errno
 import importlib
 import logging
 import os
+import shutil
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -58,7 +59,7 @@ class Place:
     panel: Panel
     function: str
     extras: tuple[str, ...] = ()
-    """Optional dependencies that the command needs; list an extra before the extras that it includes."""
+    """Optional dependencies that the command needs; list each extra before the extras that it includes."""
     space_mb: int = 300
     """Address space that the libraries and threads of the command need [MB]."""
     advice: str = ""
@@ -67,7 +68,7 @@ class Place:
     """Help text of a group of commands; a single command uses the docstring of its function."""
 
     def load(self) -> typer.Typer:
-        """Import the command; return it as an application with this one command."""
+        """Import the command, and return an application with this one command."""
         module, name = self.function.split(":")
         found = getattr(importlib.import_module(f".{module}", __package__), name)
         if isinstance(found, typer.Typer):
@@ -123,14 +124,14 @@ def explain_refusals(args: Sequence[str]) -> Iterator[None]:
         if empty is not None:
             place = empty if empty.startswith("--") else "an argument"
             raise typer.BadParameter(
-                f"{place} was given as '', which is empty; give a value, or leave it out. An unset variable "
-                "of the shell is a common cause."
+                f"{place} was given as '', which is empty; give a value, or leave it out. A common cause is "
+                "an unset shell variable."
             )
         yield
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _add_given_value(error, words)
-        if type(error) is typer.BadParameter:  # other classes, such as a missing option, keep exit code 2
+        if type(error) is typer.BadParameter:  # subclasses, such as a missing option, keep code 2
             error.exit_code = ExitCode.FAILED
         if "extra argument" in error.message:
             error.message += "; give one path, such as a folder, and put a path with spaces in quotes"
@@ -177,7 +178,7 @@ class LateCommands(SectionedGroup):
 
 
 SIMULATION_MB, BENCH_MB = 1000, 2000
-"""Address space [MB] of commands that simulate or analyse (measured: 775), or open a bench (1807)."""
+"""Address space [MB] of commands that simulate or analyse (measured: 775), or that open a bench (1807)."""
 COMMANDS = {
     "demo": Place(Panel.MEASURE, "demo:demo", ("bench", "figures"), space_mb=BENCH_MB),
     "measure": Place(Panel.MEASURE, "measure:measure", space_mb=BENCH_MB),
@@ -185,30 +186,30 @@ COMMANDS = {
     "twin": Place(Panel.MEASURE, "twin:twin", space_mb=SIMULATION_MB),
     "stop": Place(Panel.MEASURE, "watch:stop", advice=f"{SWITCH_OFF}."),
     "release": Place(Panel.MEASURE, "watch:release"),
-    "gui": Place(Panel.MEASURE, "gui:gui", ("gui",), space_mb=BENCH_MB),
+    "gui": Place(Panel.MEASURE, "watch:gui", ("gui",), space_mb=BENCH_MB),
     "analyse": Place(Panel.ANALYSE, "analyse:analyse", ("figures",), space_mb=SIMULATION_MB),
-    "catalogue": Place(Panel.ANALYSE, "catalogue:show_catalogue"),
-    "figure": Place(Panel.ANALYSE, "figure:figure", ("figures",), space_mb=SIMULATION_MB),
+    "catalogue": Place(Panel.ANALYSE, "files:show_catalogue"),
+    "figure": Place(Panel.ANALYSE, "reproduce:figure", ("figures",), space_mb=SIMULATION_MB),
     "reproduce": Place(Panel.ANALYSE, "reproduce:reproduce", ("figures",), space_mb=SIMULATION_MB),
     "specimen": Place(Panel.PREDICT, "specimen:show_specimen"),
     "predict": Place(Panel.PREDICT, "predict:predict", space_mb=SIMULATION_MB),
-    "branches": Place(Panel.PREDICT, "branches:branches", ("figures",), space_mb=SIMULATION_MB),
-    "spectrum": Place(Panel.PREDICT, "spectrum:spectrum", ("figures",), space_mb=SIMULATION_MB),
-    "chain": Place(Panel.PREDICT, "chain:chain", ("figures",), space_mb=SIMULATION_MB),
-    "study": Place(Panel.PREDICT, "study:study", space_mb=SIMULATION_MB),
+    "branches": Place(Panel.PREDICT, "dynamics:branches", ("figures",), space_mb=SIMULATION_MB),
+    "spectrum": Place(Panel.PREDICT, "dynamics:spectrum", ("figures",), space_mb=SIMULATION_MB),
+    "chain": Place(Panel.PREDICT, "dynamics:chain", ("figures",), space_mb=SIMULATION_MB),
+    "study": Place(Panel.PREDICT, "predict:study", space_mb=SIMULATION_MB),
     "map": Place(Panel.PREDICT, "map_motions:map_motions", ("figures",), space_mb=SIMULATION_MB),
-    "tradeoff": Place(Panel.PREDICT, "tradeoff:tradeoff", ("figures",), space_mb=SIMULATION_MB),
+    "tradeoff": Place(Panel.PREDICT, "predict:tradeoff", ("figures",), space_mb=SIMULATION_MB),
     "bench": Place(Panel.BENCH, "bench:bench", space_mb=BENCH_MB, help="Check and list instruments."),
     "serve-rig": Place(Panel.BENCH, "serve_rig:serve_rig", ("bench",), space_mb=BENCH_MB),
-    "export": Place(Panel.FILES, "export:export"),
-    "import": Place(Panel.FILES, "import_recording:import_file"),
-    "pack": Place(Panel.FILES, "pack:pack"),
+    "export": Place(Panel.FILES, "files:export"),
+    "import": Place(Panel.FILES, "files:import_file"),
+    "pack": Place(Panel.FILES, "files:pack"),
     "recover": Place(Panel.FILES, "recover:recover_recording"),
-    "verify": Place(Panel.FILES, "verify:verify"),
-    "examples": Place(Panel.INSTALLATION, "examples:examples"),
-    "docs": Place(Panel.INSTALLATION, "docs:docs"),
-    "schema": Place(Panel.INSTALLATION, "schema:schema"),
-    "warm": Place(Panel.INSTALLATION, "warm:warm"),
+    "verify": Place(Panel.FILES, "files:verify"),
+    "examples": Place(Panel.INSTALLATION, "installation:examples"),
+    "docs": Place(Panel.INSTALLATION, "installation:docs"),
+    "schema": Place(Panel.INSTALLATION, "installation:schema"),
+    "warm": Place(Panel.INSTALLATION, "installation:warm"),
     "doctor": Place(Panel.INSTALLATION, "doctor:doctor"),
 }
 
@@ -289,16 +290,23 @@ def vibench(
     """Set up logging for all commands."""
     handler = LogBeside()
     handler.setFormatter(OneLine("%(asctime)s %(name)s: %(message)s"))
-    # Log only vibench: other libraries would log a traceback for every broken message of a client.
+    # Log only vibench: for every broken message of a client, other libraries would log a traceback.
     ours = logging.getLogger("vibench")
     ours.handlers = [handler]
     ours.setLevel(log_level.upper())
 
 
+def warning_line(message: Warning | str) -> str:
+    """Return a warning as one line; describe numpy's warnings in the user's terms."""
+    if isinstance(message, RuntimeWarning):
+        message = f"some numbers are too large or too small to compute with ({message}); check their units"
+    return f"warning: {printable(str(message))}\n"
+
+
 def main() -> None:
     """Run the command line; on an error that the user can fix, print one sentence and exit with 1 or 3."""
-    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read at import; hides gRPC's log of ended calls
-    warnings.formatwarning = lambda message, *_place, **_named: f"warning: {printable(str(message))}\n"
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # this hides gRPC's log of ended calls
+    warnings.formatwarning = lambda message, *_place, **_named: warning_line(message)
     try:
         app()
     except CheckStopped as error:
@@ -307,12 +315,12 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
-    except UnicodeEncodeError as error:  # caused by a path: everything else is valid text
+    except UnicodeEncodeError as error:  # only a path can contain invalid text
         name = str(error.object).encode(errors="backslashreplace").decode()
         complain(OSError(f"{name} contains bytes that are not text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
-        # Every command may be given an unusable path, so errors of paths are handled here for all.
+        # Any command may be given an unusable path, so errors of paths are handled here for all commands.
         sentence = _shortage(error) or _disk_trouble(error)
         if not sentence:
             raise
@@ -321,9 +329,12 @@ def main() -> None:
 
 
 def _disk_trouble(error: Exception) -> str:
+    if isinstance(error, shutil.Error):  # it contains only the texts of the errors of all copied files
+        _, target, text = error.args[0][0]
+        error = OSError(next((n for n in DISK_ERRORS if f"[Errno {n}]" in text), 0), text, target)
     if not isinstance(error, OSError) or error.errno not in DISK_ERRORS:
         return ""
-    name = str(error.filename2 or error.filename or "a file")  # for a failed copy, filename2 is the target
+    name = str(error.filename2 or error.filename or "a file")  # filename2 is the target of a failed copy
     return DISK_ERRORS[error.errno].format(name=shorten(name, NAME_SHOWN))
 
 
@@ -345,8 +356,8 @@ def _shortage(error: BaseException | None) -> str:
     return _shortage(error.__cause__ or error.__context__)
 
 
-_PLACE = "{name} cannot be written or read; data written before are kept. Give another path"
-_ROOM = "there is no space for {name}; data written before are kept. Free space, or give another path"
+_PLACE = "{name} cannot be written or read; data written so far are kept. Give another path"
+_ROOM = "there is no space for {name}; data written so far are kept. Make room, or give another path"
 DISK_ERRORS = {
     errno.ENAMETOOLONG: "the name {name} is too long for this disk; nothing was done. Give a shorter name",
     **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _PLACE),

@@ -41,7 +41,7 @@ from .options import Fields, RequestOptions, option
 from .output import ExitCode, bold, console, errors, print_json
 from .paths import AllowExternal, AsJson, free_path, room_for_folder
 from .progress_bars import reading_bar
-from .specimen_option import SpecimenOption, read_specimen
+from .scene_options import SpecimenOption, read_specimen
 
 
 class DrivenBy(StrEnum):
@@ -49,11 +49,6 @@ class DrivenBy(StrEnum):
 
     VOLTAGE = "voltage"
     BASE = "base"
-
-    @property
-    def simulation(self) -> Simulation:
-        """Member of the analysis' `Simulation` that this kind of input selects."""
-        return {DrivenBy.VOLTAGE: Simulation.UNDER_VOLTAGE, DrivenBy.BASE: Simulation.UNDER_BASE}[self]
 
 
 NOISE = "Transmission of noise"
@@ -70,14 +65,14 @@ def analyse(
     simulate: Annotated[
         bool,
         option(
-            "Overlay a simulation on the measurement; takes seconds to minutes.",
+            "Overlay a simulation on the measurement; this takes seconds to minutes.",
             name="--simulate/--no-simulate",
         ),
     ] = True,
     driven_by: Annotated[
         DrivenBy,
         option(
-            "voltage: simulate rig and specimen several times, also valid in chaos; base: simulate the "
+            "voltage: simulate rig and specimen several times (also valid in chaos); base: simulate the "
             "specimen under the recorded base motion."
         ),
     ] = DrivenBy.VOLTAGE,
@@ -100,7 +95,7 @@ def analyse(
         option("Also estimate the hidden motion p of m1, impacts, gaps, the mass m1 and the contact law."),
     ] = False,
     keep: Annotated[
-        bool, option("With --hidden: store its result in the recording, for vibench export --results.")
+        bool, option("With --hidden: store the hidden motion in the recording, for vibench export --results.")
     ] = False,
     specimen: SpecimenOption = None,
     branches: Annotated[
@@ -144,9 +139,10 @@ def analyse(
         [read_diagram(each) for each in branches or ()],
         [open_map(each) for each in maps or ()],
     )
-    simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
+    under = Simulation.UNDER_VOLTAGE if driven_by is DrivenBy.VOLTAGE else Simulation.UNDER_BASE
+    simulation = under if simulate else Simulation.LEFT_OUT
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
-    # The path "." has no name, so use its absolute form.
+    # The path "." has no name, so use the absolute path.
     place = recording if recording.name.strip(".") else recording.resolve()
     name = place.name.removesuffix(".part").removesuffix(".h5")
     folder = free_path(place.parent / f"{name}_analysis") if out is None else out
@@ -222,7 +218,7 @@ def _print_findings(
 
 
 def _write_reports(others: Mapping[str, CampaignResults], folder: Path, *, as_json: bool) -> None:
-    """Write a further report for each channel other than m0's."""
+    """Write a further report for each channel except the channel of m0."""
     from vibench.analysis.report import write_report
 
     for role, results in others.items():

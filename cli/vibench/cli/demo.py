@@ -3,8 +3,9 @@
 import json
 import shlex
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -29,7 +30,7 @@ from vibench.sim.operating_system.this import replace_file
 from .analyse import complain_about
 from .measure import the_bench
 from .options import option
-from .output import ExitCode, bold, console, leave_output_to_json, print_json
+from .output import ExitCode, bold, console, print_json
 from .paths import AsJson, free_path
 from .progress_bars import analysis_bar
 
@@ -44,12 +45,12 @@ class Analyst:
     """Analyser of recordings in other processes; it returns results in the order of submission."""
 
     def __init__(self, pool: Pool, name: str, draws: int) -> None:
-        self._pool = pool
-        self._draws = draws
-        self._name = name
+        self._pool, self._name, self._draws = pool, name, draws
         self._folder = Path()
         self._parts: dict[int, CampaignResults | BaseException] = {}
         self.submitted = 0
+        for _ in range(PROCESSES):  # import scipy, which takes seconds, before the first recording
+            pool.ask(import_module, lambda _: None, lambda _: None, "scipy.signal")
 
     def take(self, recording: Path) -> None:
         """Submit a recording for analysis."""
@@ -60,7 +61,7 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Yield the results in order, waiting for each; raise AnalysisError if a process died."""
+        """Wait for each result and yield the results in order; raise AnalysisError if a process died."""
         for number in range(self.submitted):
             while number not in self._parts:
                 self._pool.poll(LOOK_S)
@@ -76,16 +77,6 @@ class Analyst:
                     yield results
 
 
-@contextmanager
-def analysis_processes(name: str, draws: int) -> Iterator[Analyst]:
-    """Yield an analyser in new processes; after an error, drop the unfinished analyses."""
-    pool = Pool(PROCESSES)
-    try:
-        yield Analyst(pool, name, draws)
-    finally:
-        pool.close()
-
-
 def demo(
     out: Annotated[Path | None, option("New folder for all results; default vibench_demo.", "DIR")] = None,
     draws: Annotated[
@@ -95,15 +86,12 @@ def demo(
     as_json: AsJson = False,
 ) -> None:
     """Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report."""
-    from vibench.analysis.report import write_report
-
-    if as_json:
-        leave_output_to_json()
     folder = free_path(Path("vibench_demo")) if out is None else out
     campaign = load_campaign(shipped("campaigns/demo.toml"))
     console.print("The experiment of Gong et al. (2025), section 5, on a virtual rig.")
     console.print()
-    with analysis_processes(campaign.name, draws) as analyst:
+    with closing(Pool(PROCESSES)) as pool:
+        analyst = Analyst(pool, campaign.name, draws)
 
         def take_recording(point_result: PointResult) -> None:
             if point_result.outcome is PointOutcome.RECORDED:
@@ -118,12 +106,16 @@ def demo(
         if recorded != set(campaign.recording_names()):
             raise typer.Exit(ExitCode.STOPPED)
         with analysis_bar(analyst.submitted) as observer:
-            parts = []
+            # Importing takes a second, and drawing ten, while other recordings are analysed.
+            from vibench.analysis.report import draw_cards, write_report
+
+            parts, drawn = [], {}
             for part in analyst.results():
                 parts.append(part)
+                drawn.update(draw_cards(part))
                 observer(Progress(len(parts), analyst.submitted))
     results = merge_results(campaign.name, tuple(parts))
-    report = write_report(results, folder / "report.html", folder / "figures")
+    report = write_report(results, folder / "report.html", folder / "figures", drawn=drawn)
     summary = campaign_summary(results)
     with replace_file(folder / "results.json") as coming:
         coming.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -28,13 +28,13 @@ FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
 """Extras (optional dependencies) that only developers need."""
 USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = {
-    STATE_VARIABLE: "folder for locks, bench checks and measured run times; by default the user's own",
+    STATE_VARIABLE: "folder for locks, bench checks and measured run times; by default in the user's files",
     LOCK_VARIABLE: "folder of the locks that all users of a computer share; by default /tmp",
-    TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
+    TOKEN_VARIABLE: "token of a virtual rig served to other computers",
     KEY_VARIABLE: "key file for signing the seals of recordings",
     "OPENBLAS_NUM_THREADS": "threads of linear algebra; default 1, because the matrices are small",
-    "MALLOC_MMAP_THRESHOLD_": "size above which background processes on Linux return memory at once "
-    "[bytes]; default 4 MiB",
+    "MALLOC_MMAP_THRESHOLD_": "block size above which background processes on Linux return memory "
+    "immediately [bytes]; default 4 MiB",
     "QT_QPA_PLATFORM": "Qt's platform plug-in; 'offscreen' without a display",
     "PYQTGRAPH_QT_LIB": "Qt binding of the plots; default PySide6",
 }
@@ -89,7 +89,7 @@ def libraries() -> Iterator[tuple[str, str]]:
         asking.setdefault(name, []).append(extra[1] if extra else "")
     sizes = Counter(extra for extras in asking.values() for extra in extras)
     for name, extras in asking.items():
-        # Several extras may contain the library; name the one with the fewest libraries.
+        # If several extras contain the library, name the extra with the fewest libraries.
         smallest = min(set(extras) - FOR_DEVELOPERS, key=sizes.__getitem__, default=None)
         if name == "vibench" or smallest is None:
             continue

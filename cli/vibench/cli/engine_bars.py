@@ -97,7 +97,7 @@ def engine_bars(on: Console = console) -> Iterator[EngineBars]:
 
 @contextmanager
 def show_status(ask: Callable[[], EngineStatus], engine: Engine) -> Iterator[None]:
-    """Display the newest status in a separate thread; only this thread waits for a blocked terminal.
+    """Display the newest status in a separate thread; only this thread waits if the terminal is blocked.
 
     After a stop, print on standard error who stopped the engine, and whether its output is off.
     """
@@ -117,5 +117,5 @@ def show_status(ask: Callable[[], EngineStatus], engine: Engine) -> Iterator[Non
         yield
     finally:
         ending.set()
-        # Do not wait longer: a blocked terminal must not keep the command from ending.
+        # Wait no longer than this: the command must end even if the terminal is blocked.
         thread.join(timeout=2.0)

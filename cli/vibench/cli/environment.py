@@ -4,7 +4,7 @@ Imported before numpy. One thread is best: the matrices are small, and OpenBLAS 
 busy loops. The tests of the bench check take 9 s of processor time with one thread, 11 s with two.
 
 Arrays of a recording take tens of megabytes. Linux's C library keeps such memory after it is freed. With the
-threshold below [bytes], background processes return larger blocks to the operating system at once.
+threshold below [bytes], background processes return blocks above it to the operating system at once.
 """
 
 import os

@@ -29,12 +29,11 @@ from vibench.sim.maps import (
 )
 from vibench.sim.study import ExistingStudy, plausibility_warnings
 
-from .interruption import watch_interrupt
 from .options import option
 from .output import bold, console, print_json, print_warnings
 from .paths import AllowExternal, AsJson, room_for_folder
-from .points import Cluster, Workers, complain_about_points
-from .progress_bars import study_bar
+from .progress_bars import study_bar, watch_interrupt
+from .scene_options import Cluster, Workers, complain_about_points
 
 FILE = "map.h5"
 SHOWN_MOTIONS = 12
@@ -52,7 +51,7 @@ def map_motions(
     workers: Workers = None,
     cluster: Cluster = None,
     only_estimate: Annotated[
-        bool, option("Print number of points, time and size without computing.", name="--estimate")
+        bool, option("Print the number of points, the time and the size; compute nothing.", name="--estimate")
     ] = False,
     show: Annotated[
         str | None, option(f"Quantity drawn with the kinds of motion: {', '.join(SHOWN)}.", "QUANTITY")
@@ -75,10 +74,8 @@ def map_motions(
     print_warnings(plausibility_warnings(_ends(request.amplitude_m), gaps_m))
     if show not in (None, *SHOWN):
         raise InvalidRequest(f"--show was given as {show!r}; give one of {', '.join(SHOWN)}")
-    if kicks and not request.is_basin:
-        raise InvalidRequest(
-            "--kicks needs a map in which only the start varies; give ranges for two coordinates"
-        )
+    if kicks:
+        request.require_kicks_allowed()
     if show == Observable.LYAPUNOV and Observable.LYAPUNOV not in request.observe:
         raise InvalidRequest(
             "--show lyapunov needs a map with exponents, but this map has observe = "
@@ -123,7 +120,7 @@ def _branches_along(request: Map, path: Path) -> BranchDiagram:
     drive = scene.drive.frequency_hz, scene.drive.amplitude_m
     varied = drive[0] if along is Parameter.FREQUENCY else drive[1]
     if theirs.resonance_band_hz is not None or theirs.path.drive(varied) != drive:
-        print_warnings([f"the drive of the map is not that of the branches ({theirs.title})"])
+        print_warnings([f"the drive of the map differs from the drive of the branches ({theirs.title})"])
     print_warnings([specimen_difference(scene.specimen, theirs.chosen_specimen, path.name)])
     return diagram
 
@@ -133,7 +130,7 @@ def _ends(given: float | Range) -> tuple[float, ...]:
 
 
 def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> None:
-    """Print a map's caption and motions; for initial states, also the basin boundary and effects of kicks."""
+    """Print a map's caption and motions; for initial states, add the basin boundary and effects of kicks."""
     console.print(map_caption(results))
     for number, motion in enumerate(results.motions[:SHOWN_MOTIONS]):
         console.print(f"{number}: {motion_words(results, motion)}")
@@ -143,8 +140,8 @@ def print_result(results: MapResults, stability: tuple[KickStability, ...]) -> N
         console.print(_boundary_words(results))
     for each in stability:
         console.print(
-            f"Motion {each.motion}, kicked by {each.size:g} gaps: returns in {each.returned.share:.0%} "
-            f"({each.returned.low:.0%} to {each.returned.high:.0%})"
+            f"Motion {each.motion}, kicked by {each.size:g} gaps: returns after {each.returned.share:.0%} "
+            f"({each.returned.low:.0%} to {each.returned.high:.0%}) of the kicks"
         )
 
 
@@ -156,8 +153,8 @@ def _boundary_words(results: MapResults) -> str:
     if rough is None:
         return f"{unknown} too few or too many initial states are near a boundary."
     return (
-        f"Uncertainty exponent of the boundary {rough.exponent:.2f} ({rough.low:.2f} to {rough.high:.2f}), "
-        f"so its dimension is {2.0 - rough.exponent:.2f}."
+        f"The uncertainty exponent of the boundary is {rough.exponent:.2f} ({rough.low:.2f} to "
+        f"{rough.high:.2f}), so the boundary's dimension is {2.0 - rough.exponent:.2f}."
     )
 
 

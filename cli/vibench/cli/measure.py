@@ -39,7 +39,7 @@ from vibench.sim import count_text, number_of
 
 from .engine_bars import show_status
 from .options import option
-from .output import ExitCode, console, errors, leave_output_to_json, paragraph, print_json
+from .output import ExitCode, console, errors, paragraph, print_json
 from .paths import AsJson, BenchPath, FaultsPath, rig_at
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def estimate_text(expected: CampaignEstimate) -> str:
         lead_in = timedelta(seconds=round(expected.lead_in_s))
         lines.append(f"Lead-ins to points of chains: {lead_in} (included)")
     if not expected.fits:
-        lines.append("The disk may be full before the end: free disk space, or record elsewhere")
+        lines.append("The disk may be full before the end: make room, or record elsewhere")
     return "\n".join(lines)
 
 
@@ -125,28 +125,6 @@ def duration_s(text: str) -> float:
             f"--within was given as {text!r}; give a time above zero with s, min or h, such as 30min"
         )
     return seconds
-
-
-NotifyCommand = Annotated[
-    str | None,
-    option(
-        "Command to run (no shell) at every fault and at the end; its stdin is the reason as JSON.",
-        "COMMAND",
-        name="--notify",
-    ),
-]
-MoveCommand = Annotated[
-    str | None,
-    option(
-        "Command (no shell) that moves the vibrometer to each point of a scan; it gets the point as JSON "
-        "on stdin.",
-        "COMMAND",
-        name="--move-beam",
-    ),
-]
-MailPath = Annotated[
-    Path | None, option("Send mail at every fault and at the end.", "MAIL.toml", name="--mail")
-]
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
@@ -171,7 +149,7 @@ def measure(
     accept_changed_bench: Annotated[bool, option("Resume on a different bench.")] = False,
     faults: FaultsPath = None,
     knobs: Annotated[
-        Path | None, option("Settings confirmed before with `vibench bench check --knobs`.", "SHEET.toml")
+        Path | None, option("File of settings confirmed with `vibench bench check --knobs`.", "SHEET.toml")
     ] = None,
     check: Annotated[
         CheckRule, option("Require a recent passed check, make a check now, or require no check.")
@@ -179,7 +157,7 @@ def measure(
     only_estimate: Annotated[
         bool,
         option(
-            "Print time, size and the expected uncertainty of results, without measuring.",
+            "Print time, size and expected uncertainty of the results; measure nothing.",
             name="--estimate",
         ),
     ] = False,
@@ -191,13 +169,24 @@ def measure(
     twin: Annotated[
         bool, option("Also estimate the hidden motion, and report changes of the specimen.")
     ] = False,
-    notify: NotifyCommand = None,
-    mail: MailPath = None,
-    move_beam: MoveCommand = None,
+    notify: Annotated[
+        str | None,
+        option(
+            "Command to run (no shell) at every fault and at the end; it gets the reason as JSON on stdin.",
+            "COMMAND",
+        ),
+    ] = None,
+    mail: Annotated[Path | None, option("Send mail at every fault and at the end.", "MAIL.toml")] = None,
+    move_beam: Annotated[
+        str | None,
+        option(
+            "Command (no shell) that moves the vibrometer to each point of a scan; it gets the point as "
+            "JSON on stdin.",
+            "COMMAND",
+        ),
+    ] = None,
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
-    if as_json and not only_estimate:
-        leave_output_to_json()
     plan, rig = load_campaign(campaign), rig_at(bench, faults)
     existing = ExistingRecordings.RESUME if resume else ExistingRecordings.REFUSE
     shares: tuple[TimeShare, ...] = ()

@@ -44,7 +44,7 @@ _ALLOWED = {
     "less_than_equal": "it must be {le:g} or less",
     "finite_number": "it must be a finite number",
 }
-"""Texts about the allowed values, keyed by the type of pydantic's error."""
+"""Texts that state the allowed values, keyed by the type of pydantic's error."""
 _EXAMPLES = {"error": "; for 1 % give 1%", "confidence": "; for 95 % give 0.95"}
 """Examples of allowed values, keyed by field."""
 
@@ -99,7 +99,7 @@ def option(
     panel: str | None = None,
     min: int | None = None,  # noqa: A002
     max: int | None = None,  # noqa: A002
-    callback: Callable[..., None] | None = None,
+    callback: Callable[..., object] | None = None,
 ) -> OptionInfo:
     """Return an option that is not a model's field; set ``name`` if it differs from the parameter's name."""
     names = (name,) if name else ()
@@ -147,7 +147,7 @@ def _plain(annotation: Any) -> Any:
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
     """Return a command's function with a signature for typer in which every field is an option.
 
-    A switch has no value; its opposite ``--no-name`` exists only if the command declares it.
+    A switch has no value; the opposite ``--no-name`` exists only if the command declares it.
     """
     signature = inspect.signature(function, eval_str=True)
     parameters: list[inspect.Parameter] = []
@@ -226,9 +226,13 @@ class SectionedCommand(TyperCommand):
             usual = "Arguments" if isinstance(each, TyperArgument) else "Options"
             if record is not None:
                 sections.setdefault(getattr(each, "rich_help_panel", None) or usual, []).append(record)
-        for title, rows in sections.items():
-            with formatter.section(title):
-                formatter.write_dl(rows)
+        _write_sections(formatter, sections)
+
+
+def _write_sections(formatter: Any, sections: Mapping[str, list[tuple[str, str]]]) -> None:
+    for title, rows in sections.items():
+        with formatter.section(title):
+            formatter.write_dl(rows)
 
 
 _WHOLE = 1000
@@ -244,6 +248,4 @@ class SectionedGroup(TyperGroup):
         for name, each in self.commands.items():
             heading = getattr(each, "rich_help_panel", None) or "Commands"
             sections.setdefault(heading, []).append((name, each.get_short_help_str(_WHOLE)))
-        for title, rows in sections.items():
-            with formatter.section(title):
-                formatter.write_dl(rows)
+        _write_sections(formatter, sections)

@@ -23,7 +23,7 @@ class ExitCode(IntEnum):
     DONE = 0
     """The command did everything that was requested."""
     FAILED = 1
-    """An error, a forbidden value, or a failed part of the result; standard error explains it."""
+    """An error, a forbidden value, or a failed part of the result; a text on standard error explains it."""
     MISUSED = 2
     """A command or an option is unknown or missing."""
     STOPPED = 3
@@ -52,7 +52,7 @@ def _printable(each: Any) -> Any:
     return shorten(printable(each), LONGEST_LINE) if isinstance(each, str) else each
 
 
-# Allow no markup and no emoji codes, because names and paths may look like such codes.
+# Names and paths may look like markup or emoji codes, so switch both off.
 console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
@@ -65,7 +65,7 @@ def words(text_format: str) -> "TextColumn":
 
 
 def bold(text: object) -> Text:
-    """Return bold text for the console, in which brackets do not start markup."""
+    """Return bold text for the console; brackets in this text do not start markup."""
     return Text(printable(str(text)), style="bold")
 
 
@@ -83,14 +83,9 @@ def print_table(rows: "Table") -> None:
 
 
 def print_warnings(sentences: Iterable[str]) -> None:
-    """Print warnings that are not empty on standard error, because standard output is for results."""
+    """Print all non-empty warnings on standard error, because standard output is for results."""
     for sentence in filter(None, sentences):
         errors.print(f"warning: {sentence}")
-
-
-def leave_output_to_json() -> None:
-    """Send text to standard error, so that standard output contains only the JSON document."""
-    console.file = sys.stderr
 
 
 def print_json(document: Mapping[str, object]) -> None:

@@ -9,6 +9,7 @@ import typer
 from vibench.acquisition import ConfigurationError, file_path
 
 from .options import option
+from .output import console
 
 if TYPE_CHECKING:
     from vibench.acquisition.rig import Rig
@@ -23,13 +24,23 @@ FaultsPath = Annotated[
     Path | None,
     option("Scheduled faults of a virtual rig: a file, or the name night.", "FAULTS", name="--faults"),
 ]
-AsJson = Annotated[bool, option("Print one JSON document and nothing else.", name="--json")]
+
+
+def _leave_output(is_json: bool) -> bool:
+    """With ``--json``, send text to standard error, so that standard output contains only the document."""
+    console.stderr = is_json
+    return is_json
+
+
+AsJson = Annotated[
+    bool, option("Print one JSON document and nothing else.", name="--json", callback=_leave_output)
+]
 
 
 def _allow_external(context: typer.Context, is_allowed: bool) -> None:
-    """Allow HDF5 files to link to other files until the command ends, if the user allows this."""
+    """If the user allows it, let HDF5 files link to other files until the command ends."""
     if is_allowed:
-        from vibench.sim.hdf5_files.door import allow_external_data
+        from vibench.sim.hdf5_files import allow_external_data
 
         context.with_resource(allow_external_data())
 
@@ -45,7 +56,7 @@ AllowExternal = Annotated[
 
 
 def bench_path(given: Path | None) -> Path:
-    """Return the path of the hardware configuration; by default the virtual rig's."""
+    """Return the path of the hardware configuration; by default that of the virtual rig."""
     return file_path("virtual_rig" if given is None else given, "hardware_configs")
 
 
@@ -60,29 +71,20 @@ def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
 def room_for_folder(path: Path) -> None:
     """Check, before computing, that a folder exists or can be created, and can be written to.
 
-    Raises ConfigurationError when a file has the folder's name, or writing is not permitted.
+    Raises ConfigurationError when a file has the folder's name, or when writing is not permitted.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
     try:
-        # Test by writing: permissions do not stop administrators, and /proc accepts no folders.
-        with tempfile.TemporaryDirectory(dir=standing):
+        # Test by creating a folder: permissions do not stop administrators, and /proc accepts no folders.
+        with tempfile.TemporaryDirectory(dir=standing) as trial, tempfile.TemporaryFile(dir=trial) as room:
+            room.write(bytes(1 << 14))  # folders can be created even on a full disk
             return
     except OSError as error:
-        why = "may not be written to" if standing.is_dir() else "is a file"
+        why = f"cannot be written to ({error.strerror})" if standing.is_dir() else "is a file"
         raise ConfigurationError(
             f"{path} cannot be created as a folder: {standing} {why}. Nothing was computed; give a folder "
             "that exists, or the name of a new one"
         ) from error
-
-
-def room_for_page(path: Path) -> None:
-    """Check, before computing, that a file can be written at this path.
-
-    Raises ConfigurationError when the path is a folder, or its folder cannot be created.
-    """
-    if path.is_dir():
-        raise ConfigurationError(f"{path} is a folder. Nothing was computed; give the name of a file in it")
-    room_for_folder(path.parent)
 
 
 SUFFIXES = frozenset(
@@ -94,8 +96,8 @@ SUFFIXES = frozenset(
 def file_at(out: Path | None, usual: Path) -> Path:
     """Return the path of a new file: ``out`` or, if this is a folder, the usual name in the folder.
 
-    An ``out`` without a suffix becomes a folder. Raises ConfigurationError when the file exists, or for
-    another format's suffix.
+    An ``out`` without a suffix becomes a folder. Raises ConfigurationError when the file exists, or when the
+    suffix belongs to another format.
     """
     if out is not None and not out.suffix and not out.exists():
         out.mkdir(parents=True)
@@ -113,7 +115,7 @@ def require_suffix(path: Path, suffix: str) -> None:
 
 
 def free_path(path: Path) -> Path:
-    """Return the path if no file exists there; otherwise add -2, -3, ... before its suffix."""
+    """Return the path if no file exists there; otherwise add -2, -3, ... before the suffix."""
     candidate, number = path, 1
     while candidate.exists():
         number += 1

@@ -1,13 +1,14 @@
-"""`vibench predict`: Responses I and II, and exponents, over frequency."""
+"""`vibench predict`, `study` and `tradeoff`: responses over frequency, studies, methods compared."""
 
 import math
 import time
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
+import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
@@ -31,17 +32,19 @@ from vibench.sim import (
 from vibench.sim.background import Progress
 from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
-from .interruption import watch_interrupt
-from .options import Fields, RequestOptions, option, option_name
+from .options import Fields, RequestOptions, build_request, option, option_name
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
-from .paths import AsJson, require_suffix
-from .points import Cluster, Workers, complain_about_points
-from .progress_bars import study_bar
-from .range_option import frequencies
-from .specimen_option import AXES, SPECIMEN, read_specimen
+from .paths import AllowExternal, AsJson, require_suffix, room_for_folder
+from .progress_bars import study_bar, watch_interrupt
+from .scene_options import AXES, SPECIMEN, Cluster, Workers, complain_about_points, frequencies, read_specimen
+
+if TYPE_CHECKING:
+    from vibench.sim.accuracy_benchmark import CurvePoint
+    from vibench.sim.study import StudyResults
+
 
 AUTO: Literal["auto"] = "auto"
-OPTIONS = ("window_s", "accuracy", "error", "time_s")
+STUDY_OPTIONS = ("window_s", "accuracy", "error", "time_s")
 _SHOWN = 24
 """Largest number of result rows printed on the terminal; JSON and file contain all rows."""
 
@@ -72,7 +75,7 @@ def predict(
     as_json: AsJson = False,
     *,
     choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
-    options: Annotated[RequestOptions[Study], Fields(OPTIONS)],
+    options: Annotated[RequestOptions[Study], Fields(STUDY_OPTIONS)],
 ) -> None:
     """Predict Responses I and II of m0, and of the motion p of m1, over frequency."""
     if resume and out is None:
@@ -143,12 +146,12 @@ def predict(
         if target_text:
             console.print(target_text)
     if explain:
-        (errors if as_json else console).print(paragraph(_explanation(request, points, taken_s)))
+        console.print(paragraph(_explanation(request, points, taken_s)))
     complain_about_points(request, failures, kept)
 
 
 def _refuse_beside_target(typed: Collection[str]) -> None:
-    """Refuse options whose values follow from a requested error or computing time."""
+    """Refuse options whose values follow from a target error or computing time."""
     targets = [name for name in ("error", "time_s") if name in typed]
     others = [name for name in ("accuracy", "duration_s", "budget_s") if name in typed]
     if targets and others:
@@ -187,7 +190,7 @@ def _seconds(name: str, text: str) -> float:
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
-    """Describe how points are solved, in one paragraph per group of neighbours with the same method."""
+    """Describe how points are solved: one paragraph per group of neighbouring points with the same method."""
     from vibench.sim import plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
@@ -209,7 +212,7 @@ def _passage(points: Sequence[tuple[float, ScenePlan, float]], *, has_target: bo
     worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
     method, cost = plan.method.value, points[0][1].cost
     text = " ".join(plan.sentences)
-    if not has_target:  # with a target, the result states the time
+    if not has_target:  # a result with a target states the time itself
         text += f" {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
     known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
     if known_s:
@@ -242,9 +245,9 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
     if points:
         print_table(rows)
     if len(points) == 1 and points[0].motion is MotionKind.UNDECIDED:
-        console.print(f"Undecided: {points[0].ended}. The responses are those of this window.")
+        console.print(f"Undecided: {points[0].ended}. The responses refer to this window.")
     if step > 1:
-        console.print(f"one in {step} points is shown (of {len(points)}); --json or --out gives all")
+        console.print(f"one in {step} points is shown (of {len(points)}); --json or --out gives all points")
     motions = _motions_table(points)
     if motions is not None:
         print_table(motions)
@@ -258,7 +261,7 @@ def _print_duration(points: Sequence[ScenePrediction], study: Study) -> None:
 
 
 def _share_text(point: ScenePrediction) -> str:
-    """Return the fraction of starts with this motion (5/8), "lost" for sensitive dependence, or ""."""
+    """Return the fraction of starts that reach this motion (5/8), "lost" for sensitive dependence, or ""."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.requested_motion].starts}/{ensemble.starts}"
@@ -294,7 +297,7 @@ def _motions_table(points: Sequence[ScenePrediction]) -> Table | None:
 
 
 def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Return a text about points that depend sensitively on initial conditions, and their additional runs."""
+    """Return a text about points that depend sensitively on initial conditions, and about further runs."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""
@@ -306,6 +309,136 @@ def _forgetting_text(points: Sequence[ScenePrediction]) -> str:
         averaged = sum(point.target.starts for point in lost if point.target is not None)
         return f"{text} The results there are means over {averaged} starts in total." if averaged else text
     return (
-        f"{text} Simulated there: {starts} starts, {followed_s:.0f} s in total; "
+        f"{text} There, {starts} starts were simulated for {followed_s:.0f} s in total; "
         f"several motions at {count_text(sum(each.is_one_of_several for each in lost), 'point')}."
     )
+
+
+_PAPER_HZ = 260.0
+"""Drive frequency [Hz] of the paper's four cases: no contact, two chaotic motions, and a strong drive."""
+
+
+def tradeoff(
+    amplitude: Annotated[float | None, option("Amplitude of your scene's base displacement.", "M")] = None,
+    frequency: Annotated[float | None, option("Drive frequency of your scene [Hz].", "F")] = None,
+    out: Annotated[Path | None, option("Folder for the figure and its numbers.", "DIR")] = None,
+    as_json: AsJson = False,
+    *,
+    choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
+    target: Annotated[RequestOptions[Study], Fields(("error", "time_s"))],
+) -> None:
+    """Compare the error and computing time of each method, for your scene or the paper's cases at 260 Hz.
+
+    Without --error and --time, an error of 1% is requested.
+    """
+    from vibench.sim.accuracy_benchmark import scene_curve
+
+    from .paper.options import AMPLITUDES_M
+
+    if (amplitude is None) is not (frequency is None):
+        raise InvalidRequest("a scene needs both --amplitude and --frequency; one of them is missing")
+    studies = [
+        build_request(
+            Study,
+            {
+                "specimen": read_specimen(choice.typed.get("specimen")),
+                **{axis: (choice.typed[name],) for axis, name in AXES.items() if name in choice.typed},
+                "amplitudes_m": (amplitude_m,),
+                "frequencies_hz": (_PAPER_HZ if frequency is None else frequency,),
+                **(target.typed or {"error": "1 %"}),
+            },
+        )
+        for amplitude_m in (AMPLITUDES_M if amplitude is None else (amplitude,))
+    ]
+    if out is not None:
+        room_for_folder(out)
+    curves: dict[str, list[CurvePoint]] = {}
+    for study in studies:
+        scene = study.scene((0,) * len(study.axes), Rest())
+        name = f"{study.models[0]}, {scene.drive.frequency_hz:g} Hz, {1e6 * scene.drive.amplitude_m:g} µm"
+        try:
+            curves[name] = sorted(scene_curve(scene), key=lambda each: not each.is_chosen)
+        except ValueError as fault:
+            raise InvalidRequest(str(fault)) from fault
+        if not as_json:
+            _print_curve(name, curves[name])
+            if study.error is not None and not any(each.error <= study.error for each in curves[name]):
+                console.print(f"No method reached an error of {100.0 * study.error:g} % in the time limit.")
+    if as_json:
+        found = [{"scene": name, "points": [asdict(each) for each in own]} for name, own in curves.items()]
+        print_json(found[0] if amplitude is not None else {"scenes": found})
+    if out is not None:
+        from vibench.analysis.report import curve_figure
+
+        path = curve_figure(curves).save(out)[0]
+        if not as_json:
+            console.print("The figure:", path.resolve())
+
+
+def _print_curve(name: str, points: "list[CurvePoint]") -> None:
+    rows = Table(title=f"error against computing time: {name}", title_justify="left")
+    for heading in ("method", "time [s]", "error", "", "Response I", "II"):
+        rows.add_column(heading)
+    for each in points:
+        kind = "stated" if each.is_stated else "against the best"
+        numbers = f"{each.time_s:.2g}", f"{each.error:.1g}", kind
+        mark = f"{each.method} (chosen)" if each.is_chosen else each.method
+        rows.add_row(mark, *numbers, f"{each.response_i:.5g}", f"{each.response_ii:.5g}")
+    print_table(rows)
+
+
+def study(
+    plan: Annotated[
+        Path, typer.Argument(metavar="STUDY", help="TOML file of the study, or a shipped name: paper.")
+    ],
+    out: Annotated[Path, option("File for the results.", "FILE.h5")],
+    resume: Annotated[bool, option("Compute the points missing in FILE.h5.")] = False,
+    workers: Workers = None,
+    cluster: Cluster = None,
+    only_estimate: Annotated[
+        bool, option("Print the number of points and the estimated work; compute nothing.", name="--estimate")
+    ] = False,
+    _allow_external: AllowExternal = False,
+    as_json: AsJson = False,
+) -> None:
+    """Predict every combination of the values in a file, starting with the longest runs."""
+    from vibench.acquisition import file_path, load_toml
+    from vibench.sim.study import ExistingStudy, planned_work_s, solve_study
+
+    require_suffix(out, ".h5")
+    request = load_toml(file_path(plan, "studies"), Study)
+    print_warnings(
+        plausibility_warnings(request.amplitudes_m, request.gaps_m or request.specimen.specimen().gaps_m)
+    )
+    if only_estimate:
+        points, work_s = request.grid.size, planned_work_s(request)
+        if as_json:
+            print_json({"points": points, "work_s": work_s})
+        else:
+            console.print(f"{points} points, estimated work {work_s:.2g} s on one core")
+        return
+    existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
+    with watch_interrupt() as is_stopped, study_bar(request.grid.size) as observer:
+        results = solve_study(request, out, existing, workers, cluster, observer, is_stopped)
+    if as_json:
+        print_json(study_document(results, out))
+    else:
+        failed = sum(1 for _ in results.failures())
+        state = "complete" if results.is_complete else "stopped: continue with --resume"
+        console.print(f"{out}: {results.done} of {results.study.grid.size} points, {failed} failed ({state})")
+        if results.study.error is not None:
+            console.print(results.target_text(results.study.error))
+    complain_about_points(request, list(results.failures()), results.done)
+
+
+def study_document(results: "StudyResults", out: Path) -> dict[str, object]:
+    """Return a summary of a study's results as a JSON study_document; the HDF5 file contains the values."""
+    return {
+        "file": str(out),
+        "points": results.study.grid.size,
+        "kept": results.done,
+        "is_complete": results.is_complete,
+        "sessions": len(results.sessions),
+        "failures": [{**where, "message": why} for where, why in results.failures()],
+        "study": results.study.model_dump(mode="json"),
+    }

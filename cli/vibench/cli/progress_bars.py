@@ -1,8 +1,10 @@
-"""Progress bars on standard error; without a terminal, a line every ten seconds."""
+"""Progress and interruption of long commands: bars or lines on standard error, and Ctrl-C."""
 
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from threading import Event, Thread
+from types import FrameType
 
 from rich.progress import (
     BarColumn,
@@ -23,7 +25,7 @@ LINE_INTERVAL_S = 10.0
 
 @contextmanager
 def show_bars(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]:
-    """Draw progress bars on a terminal; if there is none, print lines."""
+    """Draw progress bars on a terminal; if there is no terminal, print lines."""
     if bars.console.is_terminal:
         with bars:
             yield bars
@@ -65,7 +67,7 @@ def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
 
         def draw(progress: Progress) -> None:
             if not progress.of:
-                bars.tasks[0].total = None  # reset alone keeps the total of the previous stage
+                bars.tasks[0].total = None  # reset does not remove the total of the previous stage
                 bars.reset(bar, description=progress.note)
                 return
             left = "" if progress.remaining_s is None else f"{_duration(progress.remaining_s)} left"
@@ -110,3 +112,20 @@ def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
     with show_bars(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)
         yield lambda done: bars.advance(bar, done)
+
+
+@contextmanager
+def watch_interrupt() -> Iterator[Callable[[], bool]]:
+    """Yield a function that returns whether Ctrl-C was pressed since this context was entered."""
+    before = signal.getsignal(signal.SIGINT)
+    pressed: list[int] = []
+
+    def note(number: int, _frame: FrameType | None) -> None:
+        pressed.append(number)
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: bool(pressed)
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -1,4 +1,4 @@
-"""`vibench recover`: finish an interrupted recording."""
+"""`vibench recover`: finish an interrupted recording. It loads nothing that reads whole recordings."""
 
 from pathlib import Path
 from typing import Annotated

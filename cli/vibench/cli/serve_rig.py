@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ServedPace(StrEnum):
-    """Speed at which a served virtual rig runs, compared with real time."""
+    """Speed at which a served virtual rig runs, relative to real time."""
 
     WALL = "wall"
     FREE = "free"
@@ -46,7 +46,7 @@ def serve_rig(
     with VirtualRig(served, address, scpi_port=scpi_port, disk=DiskFaults.REFUSED) as rig:
         console.print(bold(rig.rig.name), "is on. Stop it with Ctrl-C.")
         console.print()
-        for title, lines in _hints(rig):
+        for title, lines in _rig_hints(rig):
             console.print(title)
             for line in lines:
                 console.print(f"  {line}")
@@ -61,7 +61,7 @@ def serve_rig(
     console.print("The virtual rig is off.")
 
 
-def _hints(rig: "VirtualRig") -> tuple[tuple[str, tuple[str, ...]], ...]:
+def _rig_hints(rig: "VirtualRig") -> tuple[tuple[str, tuple[str, ...]], ...]:
     opened = 'pyvisa.ResourceManager("@py").open_resource'
     usb = f"from vibench.virtual_rig import plug_in_remote; plug_in_remote({rig.daq_address!r})"
     ends = r'read_termination="\n", write_termination="\n"'

@@ -15,7 +15,7 @@ from vibench.sim.study import plausibility_warnings
 from .options import option
 from .output import bold, console, paragraph, print_json, print_warnings
 from .paths import AsJson, room_for_folder
-from .specimen_option import read_specimen
+from .scene_options import read_specimen
 
 
 def show_specimen(

@@ -35,7 +35,7 @@ from vibench.sim.operating_system.this import lower_priority
 
 from .options import option
 from .output import console, print_warnings
-from .specimen_option import SpecimenOption, read_specimen
+from .scene_options import SpecimenOption, read_specimen
 from .watch import Pid
 
 NICE = 5
@@ -46,7 +46,7 @@ IDLE_S = 0.2
 PIECE_S = 0.1
 """Duration of the samples that are processed and reported together [s]."""
 LATEST_S = 3.0
-"""Largest delay of the twin behind the measurement [s]; if it is exceeded, the twin skips samples."""
+"""Largest delay of the twin behind the measurement [s]; if the delay is larger, the twin skips samples."""
 SHOWN_S = 0.05
 SHOWN_POINTS = 320
 _WORTH_OF_GAP = 0.25
@@ -84,7 +84,7 @@ class _Following:
         if waiting <= 0:
             return POLL_S
         is_late = waiting > LATEST_S * rate_hz
-        # More samples may have arrived since the status; if they are too many, the request skips the oldest.
+        # If too many samples have arrived since the status, the request skips the oldest samples.
         most = round((PIECE_S if is_late else 2 * LATEST_S) * rate_hz)
         piece = self.client.look(self.live.next_sample, most=most)
         if piece.run_id != self.run_id or piece.volts.shape[1] == 0:
@@ -123,9 +123,9 @@ class _Following:
             levels = {**before.levels, self.plan: watch.usual}
             try:
                 keep_baseline(before.model_copy(update={"levels": levels}), path)
-            except OSError as error:  # such as a full disk; the twin continues without storing
+            except OSError as error:  # for example, a full disk: the twin continues
                 reason = f"{path} could not be written ({error.strerror})"
-                print_warnings([f"{reason}: the usual innovation of this run is not stored; free disk space"])
+                print_warnings([f"{reason}: the baseline of this run is not stored; free disk space"])
 
     def _status(self, rate_hz: float) -> TwinStatus:
         newest = self.live.newest
@@ -173,7 +173,7 @@ def twin(
     new_baseline: Annotated[bool, option("Start a new baseline after changing the specimen.")] = False,
 ) -> None:
     """Estimate the hidden motion during a measurement, and report changes of the specimen."""
-    lower_priority(NICE)  # the window and the measurement have priority
+    lower_priority(NICE)  # measurement and window have priority
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client, ThreadPoolExecutor(1) as executor:
         try:

@@ -1,10 +1,15 @@
-"""`vibench watch`, `stop` and `release`: watch, stop or resume an engine on this computer."""
+"""`vibench watch`, `stop`, `release` and `gui`: watch and control a running engine."""
 
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Annotated
 
-from vibench.acquisition import AcquisitionError, StopLevel
+import typer
+
+from vibench.acquisition import AcquisitionError, StopLevel, file_path
 from vibench.acquisition.engine import (
     DRIVING,
     Announcement,
@@ -25,7 +30,7 @@ from vibench.stop_files import SWITCH_OFF
 from .engine_bars import INTERVAL_S, engine_bars
 from .options import option
 from .output import console, print_json
-from .paths import AsJson
+from .paths import AsJson, BenchPath
 
 NAME = {"pid", "what", "started_utc"}
 Pid = Annotated[int | None, option("Process id; by default the only engine.", "N", name="--pid")]
@@ -71,7 +76,7 @@ def stop(
     if level is StopLevel.HOLD and len(programs) > 1:
         programs = (the_engine(pid),)
     failures = []
-    # Stop all programs in parallel: an unresponsive program must not delay the others.
+    # Stop all programs in parallel: a program that does not respond must not delay the others.
     with ThreadPoolExecutor(len(programs)) as pool:
         deliveries = [pool.submit(stop_engine, each, level, reason) for each in programs]
         for program, delivery in zip(programs, deliveries, strict=True):
@@ -93,7 +98,7 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
             raise EngineSilent(
                 f"{name} runs but does not answer: it hangs, or was suspended. The stop ({level.value}) is "
                 "stored, and takes effect when the program answers again. The drive continues until then: in "
-                "an emergency switch the amplifier off by hand"
+                "an emergency, switch the amplifier off by hand"
             )
         case StopDelivery.UNHEEDED:
             raise EngineSilent(
@@ -101,7 +106,7 @@ def _words(name: str, delivery: StopDelivery, level: StopLevel) -> str:
                 f"an instrument or the computer hangs. {SWITCH_OFF}"
             )
         case StopDelivery.TOLD if level is StopLevel.HOLD:
-            return f"{name}, has received the hold; 'vibench release' resumes it."
+            return f"{name}, has received the hold; 'vibench release' resumes the run."
         case StopDelivery.TOLD | StopDelivery.TAKEN:
             return f"{name}, has carried out the stop ({level.value}); its output is off."
 
@@ -110,7 +115,7 @@ def release(pid: Pid = None) -> None:
     """Continue a measurement that `vibench stop --level hold` or the window has put on hold."""
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client:
-        # A requested hold may not have taken effect yet, for example during a pause; release it as well.
+        # Release even a hold that has not taken effect yet, for example during a pause.
         client.resume()
     console.print(f"{engine.what}, process {engine.pid}, has received the release.")
 
@@ -123,3 +128,21 @@ def _facts(engine: Announcement) -> dict[str, object]:
     except EngineGone as error:
         silence = str(error)
     return {**engine.model_dump(include=NAME), "status": status, "silence": silence}
+
+
+WINDOW = "vibench.gui"
+"""Package that runs in a new process; if it were imported here, all commands would need Qt."""
+
+
+def gui(
+    bench: BenchPath = None,
+    screenshots: Annotated[Path | None, option("Save a picture of each page, and exit.", "DIR")] = None,
+) -> None:
+    """Open the window, in which you check a bench, plan, run and watch tests, and compare results."""
+    command = [sys.executable, "-m", WINDOW]
+    if bench is not None:
+        command += ["--bench", str(file_path(bench, "hardware_configs"))]
+    if screenshots is not None:
+        command += ["--screenshots", str(screenshots)]
+    ended = subprocess.run(command, check=False)  # noqa: S603 - this interpreter, and our own package
+    raise typer.Exit(ended.returncode)

@@ -36,12 +36,12 @@ ELSEWHERE = "or run without a window: QT_QPA_PLATFORM=offscreen"
 
 
 def display_trouble() -> str:
-    """Return why Qt cannot show a window, and what the user can do; empty if Qt can show one."""
+    """Return why Qt cannot show a window, and what the user can do; empty if Qt can show a window."""
     try:
         import PySide6.QtWidgets  # noqa: F401, PLC0415 - tests whether Qt can be loaded
     except ImportError as error:
         return f"Qt cannot be loaded ({error}); on Debian: apt-get install {LINKED}"
-    # Use a variable: type checkers for other systems would call the rest of the function unreachable.
+    # Use a variable: otherwise type checkers on other systems report unreachable code below.
     system: str = sys.platform
     if system != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
         return ""
@@ -102,7 +102,7 @@ def main(arguments: list[str] | None = None) -> int:
         "--screenshots", type=Path, metavar="DIR", help="save a picture of every page in DIR, and exit"
     )
     options = parser.parse_args(arguments)
-    # Make pyqtgraph use PySide6 too. One thread for linear algebra suffices, because matrices are small.
+    # Make pyqtgraph use PySide6 too. Use one thread for linear algebra, because the matrices are small.
     os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     trouble = display_trouble()
@@ -116,7 +116,7 @@ def main(arguments: list[str] | None = None) -> int:
             sys.stderr.write(f"error: {printable(str(error))}\n")
             return NO_WINDOW
     starting = _sign_of_life()
-    from .window.open_window import open_window  # noqa: PLC0415
+    from .window.window import open_window  # noqa: PLC0415
 
     if options.screenshots is not None:
         from .window.screenshots import make_screenshots  # noqa: PLC0415
@@ -126,7 +126,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _sign_of_life() -> "QLabel":
-    """Show a "starting" label at once and return it; loading the window takes seconds on a busy computer."""
+    """Show a "starting" label at once and return it, because loading the window can take seconds."""
     from PySide6.QtCore import Qt  # noqa: PLC0415
     from PySide6.QtWidgets import QApplication, QLabel  # noqa: PLC0415
 

@@ -1,7 +1,7 @@
 """Figures and claims of the paper; the modules of this package are the shipped scripts of studies/paper.
 
->>> from vibench.cli.paper.options import FigureOptions
->>> FigureOptions(gap_m=30e-6).specimen().gap_m
+>>> from vibench.cli.paper.options import Case
+>>> Case(gap_m=30e-6).specimen().gap_m
 3e-05
 """
 

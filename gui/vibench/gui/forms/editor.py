@@ -1,20 +1,127 @@
-"""One editor for each type of value in a plan."""
+"""One editor for each type of value in a plan, with the facts about a field that the form shows."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from enum import Enum
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
 
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSignalBlocker, Qt
 from PySide6.QtGui import QKeyEvent, QPaintEvent, QStandardItemModel, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
-from vibench.acquisition import ConfigurationError
+from vibench.acquisition import ChosenFrom, ConfigurationError
+from vibench.analysis.prediction.field_docstrings import field_docstring
 
-from ..widgets.units import CHOICES
-from .field_facts import FieldFacts
+from ..widgets.units import CHOICES, UNITS
 from .quantity_edit import LineField, QuantityEdit, draw_edge, parse_quantity, quantity_text, unit_of
+
+_ENDINGS = (
+    ("_m_per_s2", "m/s²"),
+    ("_m_per_s", "m/s"),
+    ("_per_s", "1/s"),
+    ("_vpp", "Vpp"),
+    ("_pt", "pt"),
+    ("_hz", "Hz"),
+    ("_db", "dB"),
+    ("_deg", "°"),
+    ("_s", "s"),
+    ("_m", "m"),
+    ("_v", "V"),
+    ("_a", "A"),
+    ("_n", "N"),
+)
+"""Endings of field names, longest first, with their units."""
+
+
+@dataclass(frozen=True)
+class FieldFacts:
+    """Description of a field for the form."""
+
+    name: str
+    label: str
+    unit: str
+    """Unit in the plan: an SI unit, or another unit such as dB."""
+    allowed: str
+    """Allowed range, such as ``"above 0, at most 60 s"``; empty if there are no limits."""
+    explanation: str
+    examples: tuple[str, ...] = ()
+    """Suggested texts; the user may also type other texts."""
+
+    @property
+    def shown_unit(self) -> str:
+        """Unit in which a number without a unit is read."""
+        return UNITS.in_field(self.unit)
+
+    @property
+    def limits(self) -> str:
+        """Allowed range of the field, in the chosen units."""
+        return UNITS.convert(self.allowed)
+
+    @property
+    def tooltip(self) -> str:
+        """Explanation of the field, followed by its limits."""
+        limits = f"Allowed: {self.limits}" if self.limits else ""
+        return "\n".join(part for part in (UNITS.convert(self.explanation), limits) if part)
+
+    @property
+    def label_with_unit(self) -> str:
+        """Label with unit; error messages about the field begin with it."""
+        return f"{self.label} ({self.shown_unit})" if self.unit else self.label
+
+    @property
+    def accessible_name(self) -> str:
+        """Name of the field for screen readers."""
+        return f"{self.label} in {self.shown_unit}" if self.unit else self.label
+
+
+def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFacts:
+    """Return the form's description of a field of a model."""
+    suffix, unit = next(((s, u) for s, u in _ENDINGS if name.endswith(s)), ("", ""))
+    words = name.removesuffix(suffix).replace("_", " ")
+    return FieldFacts(
+        name=name,
+        label=words[:1].upper() + words[1:],
+        unit=unit,
+        allowed=_limits(field, unit),
+        explanation=field_docstring(model, name),
+        examples=tuple(
+            each for mark in field.metadata if isinstance(mark, ChosenFrom) for each in mark.texts()
+        ),
+    )
+
+
+def _limits(field: FieldInfo, unit: str) -> str:
+    """Return the limits as text; a selectable unit follows each number, other units only the last."""
+    each = f" {unit}" if unit in CHOICES else ""
+    texts = ", ".join(_limit_texts(field, each))
+    return texts if each or not texts else f"{texts} {unit}".strip()
+
+
+def _limit_texts(field: FieldInfo, unit: str) -> Iterator[str]:
+    constraints = (*field.metadata, *_inner(field.annotation))
+    # State lower bounds before upper bounds.
+    for constraint in sorted(constraints, key=lambda each: isinstance(each, (Le, Lt))):
+        match constraint:
+            case Ge(ge):
+                yield f"at least {ge:g}{unit}"
+            case Gt(gt):
+                yield f"above {gt:g}{unit}"
+            case Le(le):
+                yield f"at most {le:g}{unit}"
+            case Lt(lt):
+                yield f"below {lt:g}{unit}"
+
+
+def _inner(annotation: Any) -> Iterator[object]:
+    """Yield the constraints on the elements of a tuple, or on an optional value."""
+    for part in get_args(annotation):
+        yield from getattr(part, "__metadata__", ())
+        yield from _inner(part)
 
 
 class Editor(Protocol):
@@ -26,7 +133,7 @@ class Editor(Protocol):
 
     @property
     def complaint(self) -> str:
-        """Reason why the typed text cannot be read; empty if it can be read."""
+        """Reason why the typed text cannot be read; empty if the text can be read."""
 
     def content(self) -> Any:
         """Return the value as stored in a plan file; None for an empty field."""
@@ -64,7 +171,7 @@ class Choice(QComboBox):
             self.setCurrentIndex(max(0, self.findText(chosen)))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave the space bar to the page."""
+        """Pass the space bar on to the page."""
         if event.key() == Qt.Key.Key_Space:
             event.ignore()
         else:
@@ -190,7 +297,7 @@ class SuggestionEditor:
 class ListEditor:
     """Editor of a list of values, typed in one line: ``95, 266, 500``.
 
-    If the unit can be chosen by the user, each number is read as in a quantity field.
+    If the user can choose the unit, each number is read as in a quantity field.
     """
 
     def __init__(self, unit: str, changed: Callable[..., None]) -> None:
@@ -204,7 +311,7 @@ class ListEditor:
 
     @property
     def complaint(self) -> str:
-        """Reason why the typed text is not a list of numbers; empty if it is one."""
+        """Reason why the typed text is not a list of numbers; empty if it is such a list."""
         self.content()
         return self._complaint
 
@@ -263,4 +370,4 @@ def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None
         return ListEditor(facts.unit, changed)
     if plain is str:
         return SuggestionEditor(facts.examples, changed) if facts.examples else TextEditor(changed)
-    raise TypeError(f"{facts.name} has the type {annotation}, for which there is no editor; add one")
+    raise TypeError(f"{facts.name} has the type {annotation}, for which there is no editor; add an editor")

@@ -14,8 +14,7 @@ from vibench.sim import SpecimenWarning
 
 from ..widgets.boxes import fill_box
 from ..widgets.units import CHOICES, UNITS, SentenceLabel
-from .editor import Choice, ChoiceEditor, Editor, unwrap_optional, value_editor
-from .field_facts import FieldFacts, field_facts
+from .editor import Choice, ChoiceEditor, Editor, FieldFacts, field_facts, unwrap_optional, value_editor
 
 Loc = tuple[int | str, ...]
 
@@ -37,7 +36,7 @@ class _Row:
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
-    """Return the model's error messages by field, without consequences of other errors."""
+    """Return the model's error messages, keyed by field, without consequences of other errors."""
     return {
         detail["loc"]: detail["msg"].removeprefix("Value error, ")
         for detail in error.errors()
@@ -95,7 +94,7 @@ class ModelForm(QWidget):
         self.changed.emit()
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
-        """Show errors at their fields, inner models included; return all errors with field names.
+        """Show errors at their fields, including fields of inner models; return all errors with field names.
 
         An error that concerns several fields together is shown with the name of the field changed last.
         """
@@ -130,7 +129,7 @@ class ModelForm(QWidget):
         editor = editor_for(field, facts, lambda *_: self._note_edit(name))
         complaint = SentenceLabel(rank="complaint")
         complaint.hide()
-        complaint.setAccessibleName(f"Complaint about {facts.label}")
+        complaint.setAccessibleName(f"Error message for {facts.label}")
         widget = editor.widget
         label = None if isinstance(editor, GroupEditor) else QLabel(facts.label)
         if label is None:
@@ -143,7 +142,7 @@ class ModelForm(QWidget):
         self._rows[name].explain()
 
     def _explain(self) -> None:
-        """Show values and explanations in the chosen units; unreadable text stays as it is."""
+        """Show values and explanations in the chosen units; text that cannot be read stays as it is."""
         for row in self._rows.values():
             row.explain()
             if row.facts.unit in CHOICES and not row.editor.complaint:
@@ -170,7 +169,7 @@ class GroupEditor:
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
         self._memories: dict[str, dict[str, Any]] = {}
-        """Last content of each kind, which is shown again when the user chooses that kind again."""
+        """Last content of each kind, which is shown when the user chooses that kind again."""
         self._usual: Mapping[str, Any] = {}
         self._fresh: Mapping[str, Mapping[str, Any]] = {}
         if len(kinds) > 1:
@@ -258,7 +257,7 @@ class OptionalGroupEditor(GroupEditor):
         self._there = QCheckBox(f"Give {facts.label.lower()}")
         self._there.setAccessibleName(f"Give {facts.label.lower()}")
         self._there.setToolTip(facts.tooltip)
-        # Align the check box left, with its natural width: the form may be wider than a small window.
+        # Align the check box left with its natural width, because the form may be wider than a small window.
         self._layout.insertWidget(0, self._there, alignment=Qt.AlignmentFlag.AlignLeft)
         self._there.toggled.connect(self.form.setVisible)
         self._there.toggled.connect(lambda _there: changed())
@@ -285,7 +284,7 @@ _DRAWN = frozenset({"excited_lines", "detection_lines"})
 
 
 def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
-    """Return the editor of a field, inner models included."""
+    """Return the editor of a field; the field may be an inner model."""
     plain, may_be_missing = unwrap_optional(field.annotation)
     kinds = tuple(unwrap_optional(part)[0] for part in get_args(plain)) or (plain,)
     if all(isinstance(kind, type) and issubclass(kind, BaseModel) for kind in kinds):
@@ -299,7 +298,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 
 def _may_be_emptied(field: FieldInfo) -> bool:
-    """Return whether a field may be left empty, with a meaning other than its default."""
+    """Return whether a field may be left empty and then means something other than its default."""
     return unwrap_optional(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 
@@ -348,7 +347,7 @@ class ValidatedForm(QWidget, Generic[Model]):
         self.value: Model | None = None
         """The validated model; None if the content is not allowed."""
         self.form = ModelForm(model, hidden)
-        self._complaint = SentenceLabel(rank="complaint", name=f"Complaint about the {name}")
+        self._complaint = SentenceLabel(rank="complaint", name=f"Error message for the {name}")
         self.warning = SentenceLabel(name=f"Warning about the {name}")
         """Warnings about allowed values that may be mistakes, such as springs derived from another mass."""
         fill_box(QVBoxLayout(self), self.form, self._complaint, self.warning, margin=0)

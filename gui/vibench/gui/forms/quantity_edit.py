@@ -40,21 +40,21 @@ def quantity_text(value: float, unit: str) -> str:
     """Return an SI value as text in the unit of a field, in full precision."""
     shown = UNITS.of(unit, value if abs(value) < _SMALL else 1.0)
     if shown.per_si != 1.0:
-        # Twelve digits hide that 4.5e-05 / 1e-06 is not exactly 45. The text must read back as the value.
+        # 4.5e-05 / 1e-06 is not exactly 45: write twelve digits if this text gives the same value.
         text = shown.text(value, 12)
         if parse_quantity(text, unit, shown.name) == value:
             return text
         if UNITS.chosen_units.get(unit, AUTOMATIC) != AUTOMATIC:
             return shown.text(value, _DIGITS)
         if unit in CHOICES:
-            # Do not show the SI unit: a number typed over the text would be read in it, say as metres.
+            # Do not show the SI unit: a number typed over the text would be read in metres, for example.
             return f"{Decimal(repr(value)).scaleb(round(log10(shown.per_si))):f} {shown.name}"
     number = f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
     return f"{number} {unit}".strip()
 
 
 def unit_of(text: str, unit: str) -> str:
-    """Return the unit in a field's text; if there is none, the unit of an empty field."""
+    """Return the unit in a field's text; if it has no unit, the unit of an empty field."""
     match = _NUMBER.match(text)
     return (match[2] if match else "") or UNITS.in_field(unit)
 
@@ -68,14 +68,14 @@ def parse_quantity(text: str, unit: str, shown: str = "", example: str = "") -> 
     match, shown = _NUMBER.match(text), shown or UNITS.in_field(unit)
     if match is None:
         example = example or f"12.5 {shown}".strip()
-        raise ConfigurationError(f"{_short(text)} is not a number; write for example {example}")
+        raise ConfigurationError(f"{_short(text)} is not a number; write, for example, {example}")
     number, given = match[1].replace(",", "."), match[2] or shown
     if given == unit:
         return float(number)
     if given == "g" and unit in CHOICES and "g" in CHOICES[unit]:
         return float(number) * STANDARD_GRAVITY
     if unit and given.endswith(unit) and given.removesuffix(unit) in POWERS:
-        # Text arithmetic makes 45 µm exactly 45e-6.
+        # Convert in the text: 45 µm then becomes exactly 45e-6.
         mantissa, _, exponent = number.lower().partition("e")
         return float(f"{mantissa}e{int(exponent or 0) + POWERS[given.removesuffix(unit)]}")
     raise ConfigurationError(
@@ -92,11 +92,11 @@ _LONGEST_SHOWN = 40
 _SMALL = 1e-2
 """Smallest absolute SI value that is shown without a unit prefix."""
 _DIGITS = 6
-"""Number of displayed digits of a long number; the stored value keeps all digits."""
+"""Number of digits that are displayed of a long number; the stored value keeps all digits."""
 MOST_WHOLE = 1 << 53
 """Largest integer up to which every integer is exact as a float."""
 MOST_TIMES = 1000.0
-"""Factor of change above which the user must confirm a new value, as a wrong unit is a common mistake."""
+"""Factor of change above which the user must confirm a value, because wrong units are common mistakes."""
 STEP = 0.05
 """Relative change of the value per press of an arrow key; such steps never reach zero."""
 
@@ -115,7 +115,7 @@ class QuantityEdit(QAbstractSpinBox):
         self._shown_unit = ""
         self._value: float | int | None = None
         self.complaint = ""
-        """Reason why the typed text is not an allowed quantity; empty if it is allowed."""
+        """Reason why the typed text is not an allowed quantity; empty if the quantity is allowed."""
         self._value_to_confirm: float | int | None = None
         """Value that is accepted when the user presses Return again; None if there is no such value."""
         self._is_confirmed = False
@@ -231,7 +231,7 @@ class QuantityEdit(QAbstractSpinBox):
             if value != int(value) or abs(value) > MOST_WHOLE:
                 raise ConfigurationError(f"{_short(text)} is not allowed; give a whole number below 2^53")
             return int(value)
-        # Compare texts, so that the rounding of the displayed number does not change the value.
+        # Compare texts: the displayed number is rounded, which must not change the value.
         return (
             self._value
             if self._value is not None and text == quantity_text(self._value, self._unit)

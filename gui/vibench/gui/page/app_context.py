@@ -11,8 +11,8 @@ from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, st
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import Rig
 
-from ..background.background import Background
-from ..engine_link.bridge import Bridge, Starter
+from ..background import Background
+from ..engine_link import Bridge, Starter
 from ..widgets.notice import Notice, NoticeKind, notice_of
 from ..widgets.theme import LIGHT, THEMES, Theme
 from ..widgets.units import CHOICES, UNITS
@@ -47,22 +47,22 @@ class Settings:
 
     @property
     def complaint(self) -> str:
-        """Error message if the settings file cannot be written; empty if it can."""
+        """Error message if the settings file cannot be written; empty if it can be written."""
         self._store.sync()
         if self._store.status() is QSettings.Status.NoError:
             return ""
         return (
             f"{self._store.fileName()} could not be written: the last test, campaign and layout are not "
-            "saved. Free disk space, or give another file with --settings"
+            "saved. Make room on the disk, or give another file with --settings"
         )
 
     def text(self, key: SettingKey, otherwise: str = "") -> str:
-        """Return a stored text of the settings; ``otherwise`` if none is stored."""
+        """Return a stored text of the settings; ``otherwise`` if no text is stored."""
         value = self._store.value(key.value)
         return value if isinstance(value, str) and value else otherwise
 
     def number(self, key: SettingKey, otherwise: float, low: float, high: float) -> float:
-        """Return a stored number, limited to ``low`` and ``high``; ``otherwise`` if none is stored."""
+        """Return a stored number, limited to ``low`` and ``high``; ``otherwise`` if no number is stored."""
         try:
             return min(max(float(self.text(key)), low), high)
         except ValueError:
@@ -73,7 +73,7 @@ class Settings:
         self._store.setValue(key.value, value)
 
     def state(self, key: SettingKey, name: str = "") -> QByteArray:
-        """Return the stored layout of a window or splitter; empty if none is stored."""
+        """Return the stored layout of a window or splitter; empty if no layout is stored."""
         value = self._store.value(f"{key.value}/{name}" if name else key.value)
         return value if isinstance(value, QByteArray) else QByteArray()
 
@@ -94,7 +94,7 @@ def default_settings_path() -> Path:
 
 
 class Selection(QObject):
-    """Objects edited or shown by several pages; each is complete and valid, or None."""
+    """Objects that several pages edit or show; each object is complete and valid, or None."""
 
     rig_changed = Signal()
     measurement_changed = Signal()
@@ -136,7 +136,7 @@ WORKERS = 2
 
 
 class AppContext(QObject):
-    """Services of every page; pages refer to each other by name only."""
+    """Services for every page; pages refer to other pages by name only."""
 
     folder_chosen = Signal(object)
     """Emitted with the folder of new recordings after the user has chosen another folder."""
@@ -170,7 +170,7 @@ class AppContext(QObject):
         self.bridge.recording_ended.connect(self.recording_made)
         self.background = Background(WORKERS, self)
         self.looks = Background(1, self.background)
-        """Worker process for previews, which must not wait behind long jobs."""
+        """Worker process for previews, because previews must not wait behind long jobs."""
         UNITS.choose(dict(zip(CHOICES, settings.text(SettingKey.UNITS).split(), strict=False)))
         self.theme = THEMES.get(settings.text(SettingKey.THEME), LIGHT)
 
@@ -181,7 +181,7 @@ class AppContext(QObject):
         self.theme_changed.emit(theme)
 
     def choose_units(self, chosen: Mapping[str, str]) -> None:
-        """Change the displayed units and store the choice; ``chosen`` maps SI units to displayed ones."""
+        """Change the displayed units and store the choice; ``chosen`` maps SI units to displayed units."""
         UNITS.choose(chosen)
         self.settings.keep_text(SettingKey.UNITS, " ".join(UNITS.chosen_units.values()))
 

@@ -1,4 +1,4 @@
-"""Base class of the pages, their layout in two parts, and the undo history."""
+"""Base class of the pages, layout of pages in two parts, their simulations, and the undo history."""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -6,13 +6,18 @@ from enum import Enum, auto
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar, cast
 
-from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer
 from PySide6.QtGui import QHideEvent, QResizeEvent
 from PySide6.QtWidgets import QLayout, QSplitter, QWidget
 
 from vibench.acquisition import ConfigurationError, RecordingError, open_recording
+from vibench.analysis.prediction.progress import PartialResult
+from vibench.analysis.prediction.worker import Asked, answer
+from vibench.sim.background import Job
 
-from ..widgets.boxes import ScrollArea, column, title_of
+from ..background import Background
+from ..widgets.boxes import ScrollArea, column, push_button, title_of
+from ..widgets.notice import Notice, NoticeKind
 from ..widgets.theme import Theme
 from .app_context import AppContext, SettingKey
 
@@ -45,7 +50,7 @@ def file_kind(path: Path) -> FileKind:
         try:
             open_recording(path).close()
         except RecordingError:
-            # Accept the file here; the Compare page opens it, or says why it cannot.
+            # Accept the file here; the Compare page opens the file or reports why this is impossible.
             return FileKind.BRANCHES if path.exists() else FileKind.RECORDING
         return FileKind.RECORDING
     allowed = "open a recording (.h5), or a test, campaign or hardware configuration (.toml)"
@@ -62,7 +67,7 @@ def file_kind(path: Path) -> FileKind:
 
 
 class DisplayedResult:
-    """Result shown in widgets, which are disabled while its inputs differ from the present inputs."""
+    """Result and its widgets, which are disabled while the result's inputs differ from the present inputs."""
 
     def __init__(self, wanted: Callable[[], object], *widgets: QWidget) -> None:
         self.wanted, self.widgets = wanted, widgets
@@ -71,11 +76,11 @@ class DisplayedResult:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the result shown was computed from inputs other than the present ones."""
+        """Whether the result shown was computed from inputs other than the present inputs."""
         return self.inputs is not None and self.inputs != self.wanted()
 
     def show(self, inputs: object) -> None:
-        """Store the inputs of the result that the widgets now show; None if they show nothing."""
+        """Store the inputs of the result that the widgets now show; None if the widgets show nothing."""
         self.inputs = inputs
         self.mark()
 
@@ -89,11 +94,11 @@ class ThemedPart(Protocol):
     """A part of a page that is drawn in the theme's colours."""
 
     def retheme(self, theme: Theme) -> None:
-        """Change the colours to those of a theme."""
+        """Change to the colours of a theme."""
 
 
 class Page(QWidget):
-    """Page of the window. It keeps no state of a run; every tick reads the bridge again."""
+    """Page of the window. A page keeps no state of a run; every tick reads the bridge again."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__()
@@ -104,7 +109,7 @@ class Page(QWidget):
 
     @property
     def is_done(self) -> bool:
-        """Whether the page's task is done, which the navigation bar shows by a tick."""
+        """Whether the page's task is done; the navigation bar shows this by a tick."""
         return False
 
     def refresh(self) -> None:
@@ -123,7 +128,7 @@ class Page(QWidget):
     def retheme(self, theme: Theme) -> None:
         """Change the colours of plots; other widgets follow the palette."""
         for part in self.findChildren(QWidget):
-            # hasattr is faster than isinstance: a page has hundreds of parts, and a check takes 80 µs.
+            # Use hasattr, because isinstance takes 80 µs and a page has hundreds of parts.
             if hasattr(type(part), "retheme"):
                 cast(ThemedPart, part).retheme(theme)
 
@@ -207,7 +212,7 @@ class SideAndPicture(PageParts):
     def event(self, event: QEvent) -> bool:
         """Adapt the width to a new font, even while the page is hidden."""
         if event.type() in (QEvent.Type.FontChange, QEvent.Type.Show):
-            # Adapt the width later, because the child widgets receive the new font later.
+            # Adapt the width in the next pass: the child widgets do not have the new font yet.
             QTimer.singleShot(0, self, self._divide)
         return super().event(event)
 
@@ -222,7 +227,7 @@ MOST_KEPT = 200
 
 
 class History(Generic[State]):
-    """Undo history: earlier and later states of a plan; ``show`` displays one of them on the page."""
+    """Undo history: earlier and later states of a plan; ``show`` displays one state on the page."""
 
     def __init__(self, show: Callable[[State], None]) -> None:
         self._show = show
@@ -237,14 +242,71 @@ class History(Generic[State]):
         self._now = len(self._states) - 1
 
     def undo(self) -> None:
-        """Show the previous state of the plan, if there is one."""
+        """Show the previous state of the plan, if it exists."""
         self._go(-1)
 
     def redo(self) -> None:
-        """Show the next state of the plan, if there is one."""
+        """Show the next state of the plan, if it exists."""
         self._go(1)
 
     def _go(self, step: int) -> None:
         if 0 <= self._now + step < len(self._states):
             self._now += step
             self._show(self._states[self._now])
+
+
+class Simulator(QObject):
+    """Process that computes the newest request of a page; it ends when the page is deleted.
+
+    ``grown`` receives the results so far, ``ended`` is called after the last result, and ``said`` receives
+    messages about starting, cancelling and failures.
+    """
+
+    def __init__(
+        self,
+        page: QWidget,
+        context: AppContext,
+        grown: Callable[[tuple[PartialResult, ...]], None],
+        ended: Callable[[], None],
+        said: Callable[[str], None],
+    ) -> None:
+        super().__init__(page)
+        self._context = context
+        self._grown, self._ended, self._said = grown, ended, said
+        self._job: Job | None = None
+        self.cancel_button = push_button("&Cancel", "Stop at once; keep the results so far", self.cancel)
+        self.cancel_button.setEnabled(False)
+        self.background = Background(1, self)
+        page.destroyed.connect(self.background.close)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a request is still being computed."""
+        return self._job is not None and not self._job.is_over
+
+    def begin(self, request: Asked) -> None:
+        """Start a request, and cancel an earlier one."""
+        self._drop()
+        self._job = self.background.stream(answer, self._grown, self._end, self._die, request)
+        self.cancel_button.setEnabled(True)
+        self._said("Computing; the first result appears once the program is loaded…")
+
+    def cancel(self) -> None:
+        """Cancel the request; the results obtained so far stay on the page."""
+        self._drop()
+        self._said("Cancelled; the results so far are shown.")
+
+    def _drop(self) -> None:
+        if self._job is not None:
+            self._job.drop()
+        self.cancel_button.setEnabled(False)
+
+    def _end(self, _answer: None) -> None:
+        self.cancel_button.setEnabled(False)
+        self._ended()
+
+    def _die(self, error: BaseException) -> None:
+        self.cancel_button.setEnabled(False)
+        what, done = f"The simulation failed: {error}.", "The results so far are shown."
+        self._context.say(Notice(NoticeKind.FAULT, what, done, "Compute again.", "SIMULATOR"))
+        self._said("The simulation failed.")

@@ -32,7 +32,7 @@ class UserActions(QObject):
         self._context.bridge.order(EngineClient.check, self._context.folder, new_reference=new_reference)
 
     def complete_test(self) -> Measurement | None:
-        """Return the test of the Test page; if it is not complete, show a message and return None."""
+        """Return the test of the Test page; if the test is not complete, show a message and return None."""
         measurement = self._context.selection.measurement
         if measurement is None:
             next_step = "Correct the marked fields on the Test page (Ctrl+2)."
@@ -137,7 +137,7 @@ _NEXT = {
 
 
 def free_name(folder: Path, measurement: Measurement) -> str:
-    """Return an unused file name in the folder for a test, such as ``dwell_003``."""
+    """Return a file name for a test that is not used in the folder, such as ``dwell_003``."""
     stem = measurement.name[:LONGEST_NAME]
     number = 1
     while any(folder.glob(f"{stem}_{number:03}*")):

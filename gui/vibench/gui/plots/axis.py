@@ -77,13 +77,13 @@ TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
 """Smallest distance between numbers on a vertical axis, in font heights."""
 _MINOR = 0.01
-"""Special tick spacing by which `tickStrings` recognises ticks without a number."""
+"""Special value of the tick spacing by which `tickStrings` recognises ticks without a number."""
 _WIDE = "2000"
 """Text as wide as the widest number on a logarithmic horizontal axis, with margins."""
 
 
 class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
-    """Axis of a plot; on a logarithmic scale, its coordinates are decimal logarithms."""
+    """Axis of a plot; on a logarithmic scale, the coordinates are decimal logarithms."""
 
     def __init__(self, orientation: str, axis: PlotAxis) -> None:
         super().__init__(orientation)
@@ -95,7 +95,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         self.axis = axis
         """Quantity, unit and scale of this axis."""
         UNITS.on_change(self._show_other_unit)
-        # Cache the image of the axis, because its text takes the largest part of a frame.
+        # Cache the image of the axis, because the axis text takes most of a frame's time.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     def show_unit(self, axis: PlotAxis) -> None:
@@ -168,7 +168,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
             factor = self.axis.display.per_si
-            # Return only ticks with numbers, because each grid line takes time in every frame.
+            # Return only ticks with numbers, because every further grid line takes time in every frame.
             levels = super().tickValues(low * factor, high * factor, size)
             step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             widest = max(super().tickStrings(values, 1.0, step), key=len, default="")
@@ -199,7 +199,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 def thin_ticks(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
     """Return a larger step, and the ticks at its multiples, of which there are at most ``most``.
 
-    An axis needs two numbers. If fewer are left, return the two outermost ticks of the smaller step.
+    An axis needs two numbers. If fewer than two are left, return the two outermost ticks of the smaller step.
     """
     wider, kept = step, list(values)
     for every in (1, 2, 5, 10, 20, 50, 100):

@@ -28,7 +28,7 @@ class Dash(Enum):
 
 @dataclass(frozen=True)
 class LineStyle:
-    """Dash pattern of a line, and the function that returns its colour in a theme."""
+    """Dash pattern of a line, and the function that returns the line's colour in a theme."""
 
     colour: Callable[[Theme], Colour]
     dash: Dash = Dash.SOLID
@@ -88,7 +88,7 @@ def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
 
 
 class _LogicalCurve(pg.PlotCurveItem):  # type: ignore[misc] # untyped library
-    """Curve that draws a thick line as several thin ones, shifted by one screen pixel each.
+    """Curve that draws a thick line as several thin lines, each shifted by one more screen pixel.
 
     A pen of two pixels looks the same but takes three times as long, because Qt draws it as an area.
     """

@@ -1,12 +1,15 @@
 """Base class of all plots: labelled axes whose range follows the data in steps, and a legend."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from html import escape
 from math import isfinite
+from typing import Any
 
+import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QKeyEvent, QPainter, QPalette, QResizeEvent
+from numpy.typing import NDArray
+from PySide6.QtCore import QEvent, QLineF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QKeyEvent, QPainter, QPalette, QPen, QResizeEvent
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from vibench.acquisition import printable
@@ -16,14 +19,99 @@ from ..widgets.theme import Theme
 from ..widgets.units import UNITS
 from .axis import AxisItem, Blankness, Grid, PlotAxis, Scale
 from .line_style import SIGNS, Band, LineStyle, LogicalLine, curve_pen, shade_of, straight_pen
-from .plot_actions import add_actions
-from .reading import Reading
-from .upright_marks import Rules, Stripes
+from .plot_actions import Reading, add_actions
+
+_BEHIND = -10
+"""Drawing order below the curves."""
+_LEAST_APART = 5
+"""Smallest distance between drawn lines [pixels]; closer lines would look like a grey area."""
+
+
+class _UprightMarks(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
+    """Base class of items that draw many marks; one item per mark would slow down every frame."""
+
+    def __init__(self, across: Callable[[float], float]) -> None:
+        super().__init__()
+        self._across = across
+        """Function from a value to its coordinate on the axis, which may be logarithmic."""
+        self.setZValue(_BEHIND)
+
+    def _begin(self, painter: QPainter) -> tuple[QRectF, float, float]:
+        """Let the painter draw in pixels; return the visible rectangle, scale and shift to columns."""
+        to_pixels = painter.transform()
+        visible = to_pixels.mapRect(self.boundingRect())
+        painter.resetTransform()
+        return visible, to_pixels.m11(), to_pixels.m31()
+
+
+class Stripes(_UprightMarks):
+    """Vertical stripes, each at least one pixel wide, so that all stripes are visible."""
+
+    def __init__(self, across: Callable[[float], float]) -> None:
+        super().__init__(across)
+        self._shade: object = Qt.GlobalColor.gray
+        self._bands: NDArray[np.float64] = np.empty((0, 2))
+
+    def show_bands(self, bands: Iterable[tuple[float, float]]) -> None:
+        """Show stripes, each given by its lower and upper end."""
+        places = [(self._across(low), self._across(high)) for low, high in bands]
+        self._bands = np.array(places, dtype=np.float64).reshape(-1, 2)
+        self.update()
+
+    def dress(self, shade: object) -> None:
+        """Set the colour of the stripes."""
+        self._shade = shade
+        self.update()
+
+    def paint(self, painter: QPainter, *_: object) -> None:
+        """Fill every pixel column that has a stripe exactly once, so that overlaps are not darker."""
+        visible, scale, shift = self._begin(painter)
+        width = max(1, round(visible.width()))
+        edges = np.clip(np.floor(self._bands * scale + shift - visible.left()), -1, width).astype(int)
+        steps = np.zeros(width + 3, dtype=int)
+        np.add.at(steps, edges[:, 0] + 1, 1)
+        np.add.at(steps, np.maximum(edges[:, 1], edges[:, 0] + 1) + 1, -1)
+        covered = (np.cumsum(steps) > 0)[1 : width + 1]
+        turns = np.flatnonzero(np.diff(covered.astype(int), prepend=0, append=0))
+        for first, last in turns.reshape(-1, 2).tolist():
+            painter.fillRect(
+                QRectF(visible.left() + first, visible.top(), last - first, visible.height()), self._shade
+            )
+
+
+class Rules(_UprightMarks):
+    """Vertical lines of a plot; if the lines are too close together, no line is drawn."""
+
+    def __init__(self, across: Callable[[float], float]) -> None:
+        super().__init__(across)
+        self._pen = QPen()
+        self._places: NDArray[np.float64] = np.empty(0)
+
+    def show_at(self, values: Iterable[float]) -> None:
+        """Show a vertical line at each value."""
+        self._places = np.array([self._across(value) for value in values], dtype=np.float64)
+        self.update()
+
+    def dress(self, pen: QPen) -> None:
+        """Set the pen of the lines."""
+        self._pen = pen
+        self.update()
+
+    def paint(self, painter: QPainter, *_: object) -> None:
+        """Draw the visible lines."""
+        visible, scale, shift = self._begin(painter)
+        columns = np.unique(np.round(self._places * scale + shift))
+        columns = columns[(columns >= visible.left()) & (columns <= visible.right())]
+        if columns.size * _LEAST_APART > visible.width():
+            return
+        painter.setPen(self._pen)
+        painter.drawLines([QLineF(at, visible.top(), at, visible.bottom()) for at in columns.tolist()])
+
 
 ROOM = 0.15
 """Margin at both ends when an axis is fitted to the data, relative to the range of the data."""
 LEAST_USED = 0.5
-"""Smallest fraction of an axis that the data may fill; below it, the axis range is reduced."""
+"""Smallest fraction of an axis that the data may fill; if they fill less, the axis range is reduced."""
 
 Range = tuple[float, float]
 
@@ -36,7 +124,7 @@ def steady_range(shown: Range, data: Range) -> Range | None:
     if is_inside and size >= LEAST_USED * (shown[1] - shown[0]):
         return None
     if size <= 0.0:
-        # A constant signal needs a range around its value, whatever its unit.
+        # In any unit, a constant signal needs a range around its value.
         half = 0.5 * abs(low) or 1e-3
         wanted = (low - half, high + half)
         return None if is_inside and shown[1] - shown[0] <= 8 * half else wanted
@@ -90,6 +178,19 @@ class LegendLine(QLabel):
             self.setAccessibleName("Legend: " + ", ".join(names))
 
 
+Curves = Mapping[str, pg.PlotDataItem]
+"""Curves of a plot, keyed by the result's field that each curve shows."""
+
+
+def show_fields(curves: Curves, result: Any) -> None:
+    """Draw fields of a result over its frequency, each in the curve with the field's name; None clears."""
+    for name, curve in curves.items():
+        if result is None:
+            curve.clear()
+        else:
+            curve.setData(result.frequency_hz, np.asarray(getattr(result, name)))
+
+
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     """Plot with one pair of axes. Curves get plain values, which the plot converts for logarithmic axes.
 
@@ -97,14 +198,14 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     """
 
     up_em = 5.0
-    """Width of the vertical axis, in font heights; equal in all plots, so that stacked plots align."""
+    """Width of the vertical axis, in font heights; the same in all plots, so that stacked plots align."""
 
     def __init__(
         self, name: str, across: PlotAxis, up: PlotAxis, theme: Theme, parent: QWidget | None = None
     ) -> None:
         self.across = AxisItem("bottom", across)
         self.up = AxisItem("left", up)
-        # pyqtgraph's own menus would take half of the time for creating a plot.
+        # Without pyqtgraph's own menus, creating a plot takes half the time.
         super().__init__(parent=parent, axisItems={"bottom": self.across, "left": self.up}, enableMenu=False)
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
@@ -112,7 +213,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             # Unlink invisible axes: pyqtgraph would update their labels at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
         for axis in (self.across, self.up):
-            # Paint the axes before the grid, because painting the axes determines the ticks for the grid.
+            # Paint the axes before the grid: painting an axis determines the ticks that the grid needs.
             axis.setZValue(_FIRST)
         # Hide the last number of an axis where it would be cut off.
         self.up.setStyle(hideOverlappingLabels=True)
@@ -146,7 +247,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Fit axes and margins to the font."""
         em = self.fontMetrics().height()
         self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * em), 1)
-        # Fix the width of the axis: a width that depends on the numbers would require painting twice.
+        # Fix the width of the axis, because a width that depends on the numbers would require painting twice.
         self.up.setWidth(self.up_em * em)
 
     def with_legend(self) -> "Plot":
@@ -251,7 +352,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def columns(self) -> int:
         """Number of columns in which a signal is drawn by its smallest and largest values.
 
-        It is slightly more than the width in logical pixels, so that no pixel between columns stays empty.
+        It slightly exceeds the width in logical pixels, so that no pixel between columns stays empty.
         """
         return int(1.02 * self.getViewBox().width()) + 2
 
@@ -299,7 +400,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def drawForeground(self, painter: QPainter, rect: QRectF) -> None:
         """Draw the hint on an empty plot, or dim a disabled plot."""
         super().drawForeground(painter, rect)
-        # Clearing a curve emits no signal, so look for points again.
+        # No signal reports that a curve was cleared, so look for points again.
         self._look_for_points()
         if self._is_empty or not self.isEnabled():
             painter.resetTransform()
@@ -349,7 +450,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self, line_style: LineStyle, position: float, angle: float, label: str, at: float
     ) -> pg.InfiniteLine:
         options = {"position": at, "movable": False}
-        label = printable(label).replace("{", "{{").replace("}", "}}")  # pyqtgraph uses it as a format string
+        label = printable(label).replace("{", "{{").replace("}", "}}")  # pyqtgraph needs a format string
         item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
         self.addItem(item, ignoreBounds=True)
 

@@ -34,7 +34,7 @@ from .notice import clock
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
 Part = Content | tuple[Content, int] | int
-"""Widget or layout, with or without a stretch factor; a number alone is empty space that stretches."""
+"""Widget or layout, with or without a stretch factor; a number alone means empty space that stretches."""
 
 
 def fill_box(box: Box, *parts: Part, margin: int | None = None) -> Box:
@@ -211,7 +211,7 @@ def plain_tip(text: str) -> str:
 
 
 class ElidedLabel(QLabel):
-    """Label of one line; text that does not fit ends in dots, and the tooltip shows all of it."""
+    """Label of one line; text that does not fit ends in dots, and the tooltip shows the whole text."""
 
     LETTERS = 3
 
@@ -256,7 +256,7 @@ LEAST_S = 1.0
 
 
 class ProgressBar(QProgressBar):
-    """Progress bar with a text; text that does not fit ends in dots, and the tooltip shows all of it."""
+    """Progress bar with a text; text that does not fit ends in dots, and the tooltip shows the whole text."""
 
     def __init__(self, name: str, text: str = "") -> None:
         super().__init__()

@@ -1,10 +1,18 @@
-"""Read-only table whose cells can be copied."""
+"""Read-only table whose cells can be copied, and bars in its cells."""
 
 from collections.abc import Callable, Iterable, Sequence
 
-from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, Qt, QTimer
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QTableWidget, QTableWidgetItem
+from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelIndex, QRectF, Qt, QTimer
+from PySide6.QtGui import QAction, QColor, QGuiApplication, QKeySequence, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+    QTableWidget,
+    QTableWidgetItem,
+)
 
 from .boxes import hint_in_list, plain_lines, plain_tip
 from .units import UNITS
@@ -94,7 +102,7 @@ class ReadTable(QTableWidget):
         self._hint = hint
         self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
         UNITS.on_change(self._write)
-        # The width changes in many steps. Fit the row heights once, after the last step.
+        # The width changes in many steps: fit the row heights only after the last step.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._fit)
 
@@ -145,3 +153,28 @@ class ReadTable(QTableWidget):
         for row in range(self.rowCount()):
             if self.rowHeight(row) > one_line:
                 self.setRowHeight(row, self.rowHeight(row) + _ROW_ROOM)
+
+
+SHARE_ROLE = Qt.ItemDataRole.UserRole + 1
+"""Item role under which a table cell stores the length of its bar; 1 is the cell's whole width."""
+OVER = "#b3261e"
+NEAR = "#a06a00"
+WELL = "#00694d"
+NEAR_SHARE = 0.8
+
+
+class BarDelegate(QStyledItemDelegate):
+    """Delegate that paints a bar in a table cell; for a value above 1 the bar is full and red."""
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Cell) -> None:
+        """Paint the bar below the text."""
+        share = index.data(SHARE_ROLE)
+        if isinstance(share, float):
+            area = QRectF(option.rect).adjusted(2, 3, -2, -3)
+            area.setWidth(area.width() * min(share, 1.0))
+            painter.save()
+            colour = QColor(OVER if share > 1 + 1e-9 else NEAR if share > NEAR_SHARE else WELL)
+            colour.setAlphaF(0.35)
+            painter.fillRect(area, colour)
+            painter.restore()
+        super().paint(painter, option, index)

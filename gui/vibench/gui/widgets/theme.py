@@ -48,9 +48,9 @@ class Theme:
     accent: Colour
     tones: Mapping[Tone, Paint]
     traces: tuple[Colour, ...]
-    """Colours of curves in order of use: those of Okabe and Ito, adapted to the background."""
+    """Colours of curves in order of use: the colours of Okabe and Ito, adapted to the background."""
     predicted: Colour
-    """Colour of simulated curves, which are dashed as well."""
+    """Colour of simulated curves; these curves are dashed as well."""
 
 
 _STRONG_TONES = {
@@ -91,7 +91,7 @@ THEMES = {theme.name: theme for theme in (LIGHT, DARK)}
 
 
 def palette(theme: Theme) -> QPalette:
-    """Return the palette of a theme for Qt's widgets; unlike a colour scheme, it works on every desktop."""
+    """Return the palette of a theme for Qt's widgets; a palette, not a colour scheme, works everywhere."""
     role = QPalette.ColorRole
     colours = QPalette()
     for where, colour in (

@@ -59,7 +59,7 @@ class ShownUnit:
     def text(self, value: float, digits: int = 3) -> str:
         """Return an SI value in this unit as text."""
         shown = value * self.per_si
-        # Do not round a number of points: 8192 points, not 8190.
+        # Do not round a number of points, such as 8192, to 8190.
         number = f"{shown:.0f}" if self.name == "points" else f"{shown:.{digits}g}"
         return f"{_number_text(Decimal(number))} {self.name}".strip()
 
@@ -83,7 +83,7 @@ class DisplayUnits:
 
     def __init__(self) -> None:
         self._chosen = {si: choices[0] for si, choices in CHOICES.items()}
-        # Keep weak references: this object outlives every window and must not call a closed widget.
+        # Keep weak references, because this object outlives every window and must not call a closed widget.
         self._listeners: dict[WeakMethod[Callable[[], None]], None] = {}
 
     def on_change(self, listener: Callable[[], None]) -> None:
@@ -99,7 +99,7 @@ class DisplayUnits:
         return MappingProxyType(self._chosen)
 
     def choose(self, chosen: Mapping[str, str]) -> None:
-        """Choose the units, by SI unit; a missing or unknown unit selects the default."""
+        """Choose the units, keyed by SI unit; if a unit is missing or unknown, the default is chosen."""
         names = {si: chosen.get(si, "") for si in CHOICES}
         wanted = {si: name if name in CHOICES[si] else CHOICES[si][0] for si, name in names.items()}
         if wanted != self._chosen:
@@ -166,7 +166,7 @@ def _with_breaks(word: re.Match[str]) -> str:
 
 
 UNITS = DisplayUnits()
-"""The displayed units of the whole program; all pages use the same ones."""
+"""The displayed units of the whole program; all pages use the same units."""
 
 
 class SentenceLabel(QLabel):

@@ -93,7 +93,7 @@ class StateIndicator:
     detail: str = ""
     """Text that changes while the state lasts, such as elapsed time and drive level."""
     is_ramping: bool = False
-    """Whether the drive is already ramping down, so that STOP can only shorten the ramp."""
+    """Whether the drive is already ramping down; STOP can then only shorten the ramp."""
 
 
 STOP_TEXT, AT_ONCE_TEXT = "■ STOP: ramp down   (Esc: abort)", "■ STOP: at once   (Esc: abort)"
@@ -274,7 +274,7 @@ _DETAIL_LINES = 14
 class MessageStrip(QFrame):
     """Strip with the newest message: what happened, what was done, what to do next.
 
-    Its height is constant, so that nothing below it moves. Without a message, it shows the next step.
+    Its height is constant, so that nothing below it moves. If there is no message, it shows the next step.
     The Details button opens the list of all messages over the page.
     """
 

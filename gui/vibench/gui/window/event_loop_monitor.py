@@ -36,8 +36,8 @@ class Wait:
 class EventLoopMonitor(QObject):
     """Timer that measures its own delays.
 
-    Work, file access, locks and other Python threads delay the timer. The time spent waiting for a processor
-    is subtracted, so that other programs on the computer do not count.
+    Work in this thread, file access, locks and other Python threads delay the timer. The time spent waiting
+    for a processor is subtracted, so that other programs on the computer do not count.
     """
 
     def __init__(self, about: Callable[[], str], parent: QObject | None = None) -> None:
@@ -114,7 +114,7 @@ class EventLoopMonitor(QObject):
 
 
 class _Delays:
-    """Reader of the time that this thread waited for a processor; zero if the system does not report it."""
+    """Reader of the time that this thread waited for a processor; zero if the system reports none."""
 
     def __init__(self) -> None:
         try:
@@ -129,7 +129,7 @@ class _Delays:
         return 1e-9 * int(read_at(self._file, 100, 0).split()[1])
 
     def close(self) -> None:
-        """Close the operating system's file that contains the waiting time."""
+        """Close the file in which the operating system reports the waiting time."""
         if self._file >= 0:
             os.close(self._file)
             self._file = -1

@@ -217,7 +217,7 @@ class AbortKey(QObject):
         return False
 
     def _is_new(self, event: QKeyEvent) -> bool:
-        """Return whether an event is a new key press, because Qt delivers the same press several times."""
+        """Return whether an event is a new key press; Qt delivers the same press several times."""
         seen = (event.timestamp(), event.key())
         is_new = seen != self._last_seen
         self._last_seen = seen
@@ -341,7 +341,7 @@ def choose_folder(parent: QWidget, context: AppContext) -> None:
 
 
 def show_keys(parent: QWidget, actions: tuple[MenuAction, ...]) -> None:
-    """Show the list of keys in a separate window, which does not block the main one."""
+    """Show the list of keys in a separate window, which does not block the main window."""
     text = f"{key_text(actions)}<p>{EMERGENCY}</p>"
     box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", text, parent=parent)
     box.setModal(False)

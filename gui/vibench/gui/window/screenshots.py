@@ -21,14 +21,13 @@ from vibench.analysis.live import RowSpacing
 from ..page.app_context import AppContext, SettingKey, Settings
 from ..pages.compare.compare_page import ComparePage
 from ..pages.files.files_page import FilesPage
-from ..pages.maps.maps_page import MapsPage
+from ..pages.maps import MapsPage
 from ..pages.queue.queue_page import QueuePage
 from ..pages.simulate.simulate_page import SimulatePage
 from ..pages.test.test_page import TestPage
 from ..widgets.notice import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
 from ..widgets.theme import THEMES, Theme
-from .open_window import application
-from .window import PAGES, Window
+from .window import PAGES, Window, application
 
 SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))
@@ -70,7 +69,7 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         settings = Settings(Path(scratch) / "window.ini")
         if bench is not None:
             settings.keep_text(SettingKey.BENCH, str(bench.resolve()))
-        # Changing the theme and saving pictures block the window, so an attended run would stop.
+        # Saving pictures and changing the theme block the window, which would stop an attended run.
         context = AppContext(settings, partial(start_engine, Supervision.UNATTENDED))
         context.choose_folder(Path(scratch) / "recordings")
         window = Window(context, PAGES)
@@ -193,7 +192,7 @@ def _save(window: Window, folder: Path, name: str) -> None:
 
 
 def _write(picture: QImage, path: Path) -> None:
-    """Save a picture with 32 shades per colour, which halves the file size without a visible loss."""
+    """Save a picture with 32 shades per colour: the file size is halved without a visible loss."""
     picture = picture.convertToFormat(QImage.Format.Format_RGB32)
     shades = np.frombuffer(picture.constBits(), np.uint8) & 0xF8
     small = QImage(

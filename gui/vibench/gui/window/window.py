@@ -1,38 +1,45 @@
 """The main window: banner with STOP, messages, navigation bar, pages, status line."""
 
+import gc
+import sys
 from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from time import monotonic
 
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
+import matplotlib as mpl
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer, Signal
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QFont, QFontDatabase, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
+    QLabel,
     QListWidget,
     QListWidgetItem,
     QMainWindow,
     QMessageBox,
     QSizePolicy,
     QStackedWidget,
+    QStyleFactory,
     QVBoxLayout,
     QWidget,
 )
 
-from vibench.acquisition import ConfigurationError
+from vibench.acquisition import ConfigurationError, printable
 from vibench.acquisition.engine import CampaignRequest, unattended_engine
 
-from ..background.background import in_next_pass
-from ..engine_link.bridge import Urgency
-from ..page.app_context import AppContext, SettingKey
+from ..background import in_next_pass
+from ..engine_link import Urgency
+from ..page.app_context import AppContext, SettingKey, Settings, default_settings_path
 from ..page.page import Page, file_kind
 from ..page.user_actions import UserActions
 from ..pages.compare.compare_page import ComparePage
 from ..pages.files.files_page import FilesPage
-from ..pages.maps.maps_page import MapsPage
+from ..pages.maps import MapsPage
 from ..pages.queue.queue_page import QueuePage
-from ..pages.rig.rig_page import RigPage
+from ..pages.rig import RigPage
 from ..pages.run.run_page import RunPage
 from ..pages.simulate.simulate_page import SimulatePage
 from ..pages.test.test_page import TestPage
@@ -64,7 +71,7 @@ PAGES: Mapping[str, Callable[[AppContext], Page]] = {
     QUEUE: QueuePage,
     MAPS: MapsPage,
 }
-"""Pages in the order of the navigation bar; Ctrl and a number selects one."""
+"""Pages in the order of the navigation bar; Ctrl and a number selects a page."""
 
 
 DONE = "✔"
@@ -113,7 +120,7 @@ class NavigationBar(QListWidget):
             self._fit()
 
     def _fit(self) -> None:
-        """Fit the width to the longest name in bold with a tick, as for a selected page."""
+        """Fit the width to the longest name in bold with a tick, as shown for a selected page."""
         bold = self.font()
         bold.setBold(True)
         metrics = self.fontMetrics()
@@ -135,7 +142,7 @@ TICK_MS = 50
 
 
 class Window(QMainWindow):
-    """The main window; pages and banner show the engine's state at every tick."""
+    """The main window; its pages and its banner show the engine's state at every tick."""
 
     def __init__(self, context: AppContext, pages: Mapping[str, Callable[[AppContext], Page]]) -> None:
         super().__init__()
@@ -219,7 +226,7 @@ class Window(QMainWindow):
         super().closeEvent(event)
 
     def adopt_left_campaign(self) -> None:
-        """Take over an engine and its campaign that another window left running, if there is one."""
+        """If another window left an engine and its campaign running, take them over."""
         self.context.background.ask(unattended_engine, self.context.bridge.adopt, self.context.fail)
 
     def _show_adopted(self, request: CampaignRequest) -> None:
@@ -247,7 +254,7 @@ class Window(QMainWindow):
         if self.context.bridge.may_leave:
             leave = box.addButton("Continue it and close", QMessageBox.ButtonRole.DestructiveRole)
             box.setInformativeText(
-                "It was armed to run unattended: 'vibench watch' or a new window shows it; "
+                "The campaign was armed to run unattended: 'vibench watch' or a new window shows it; "
                 "'vibench stop' ends it."
             )
         box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
@@ -294,7 +301,7 @@ class Window(QMainWindow):
         assert isinstance(application, QApplication)
         application.setPalette(palette(theme))
         sheet = style_sheet(theme)
-        # Set style sheets part by part: one for the whole application would block the event loop for 0.3 s.
+        # Set style sheets part by part: setting one for the application blocks the event loop for 0.3 s.
         for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
         in_sight = self._stack.currentWidget()
@@ -330,7 +337,7 @@ class Window(QMainWindow):
         self.page.enter()
 
     def changeEvent(self, event: QEvent) -> None:
-        """Apply a change of the font; parts with a style sheet need a new style sheet."""
+        """Apply a change of the font; parts that have a style sheet need a new style sheet."""
         super().changeEvent(event)
         if event.type() is QEvent.Type.FontChange and self.isVisible():
             self._retheme(self.context.theme)
@@ -372,3 +379,56 @@ class Window(QMainWindow):
         self.context.settings.forget_layout()
         self.showNormal()
         self.resize(1280, 800)
+
+
+FONT_FILES = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf", "DejaVuSansMono.ttf")
+FONT_POINTS = 10
+SMALLEST_POINTS, LARGEST_POINTS = 7, 24
+
+
+def application(arguments: list[str]) -> QApplication:
+    """Return the application, with the same style and font on every computer."""
+    existing = QCoreApplication.instance()
+    if existing is None:
+        QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
+        existing = QApplication(arguments)
+    assert isinstance(existing, QApplication)
+    existing.setApplicationName("vibench")
+    existing.setStyle(QStyleFactory.create("Fusion"))
+    # DejaVu Sans has all required characters and is installed with matplotlib.
+    folder = Path(mpl.get_data_path()) / "fonts" / "ttf"
+    for name in FONT_FILES:
+        QFontDatabase.addApplicationFont(str(folder / name))
+    existing.setFont(QFont("DejaVu Sans", FONT_POINTS))
+    return existing
+
+
+def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
+    """Show the window in place of the label ``starting`` until it is closed; return the exit code."""
+    app = application(["vibench"])
+    stored = Settings(settings or default_settings_path())
+    context = AppContext(stored)
+    context.first_bench = None if bench is None else bench.resolve()
+    font = app.font()
+    font.setPointSize(int(stored.number(SettingKey.FONT, FONT_POINTS, SMALLEST_POINTS, LARGEST_POINTS)))
+    app.setFont(font)
+    window = Window(context, PAGES)
+    # Garbage collection blocks the event loop, so exempt existing objects.
+    gc.freeze()
+    window.show()
+    if starting is not None:
+        starting.close()
+    QTimer.singleShot(0, window.context.background.prepare)
+    QTimer.singleShot(0, window.adopt_left_campaign)
+    QTimer.singleShot(0, Thread(target=load_ahead).start)
+    code = app.exec()
+    if complaint := stored.complaint:
+        sys.stderr.write(f"{printable(complaint)}\n")
+        code = code or 1
+    return code
+
+
+def load_ahead() -> None:
+    """Import the modules for the first prediction and its curves, after the window has been painted."""
+    import_module("scipy.signal")
+    getattr(import_module("vibench.analysis"), "MeasurementPrediction")  # noqa: B009

@@ -36,7 +36,7 @@ def export_comparison(
     pair: tuple[Curve, Curve] | None,
     markers_hz: tuple[float, ...],
 ) -> Path:
-    """Write the comparison to ``path``, in the format of its suffix; return the path written."""
+    """Write the comparison to ``path``, in the format of its suffix; return the path of the file."""
     from vibench.analysis.report import write_comparison  # noqa: PLC0415 - loading it takes most of a second
 
     return write_comparison(path, curves, recordings, pair, markers_hz)
@@ -133,7 +133,7 @@ class ComparePage(Page):
                     self._show_error,
                     path,
                     options.request,
-                    options.simulation,
+                    options.model,
                 )
             )
         self._say_progress()
@@ -168,7 +168,7 @@ class ComparePage(Page):
     def _add_recording(self, found: ComparedRecording) -> None:
         others = [each for path, each in self._recordings.items() if each is not None and path != found.path]
         if (first := first_copies([*others, found])[-1]) < len(others):
-            self._recordings.pop(found.path, None)  # absent if its path was requested twice
+            self._recordings.pop(found.path, None)  # absent if this path was requested twice
             text = copy_sentence(others[first], str(others[first].path), found)
             self.context.warn(f"{found.path} {text}.", "It is shown once.")
             self._end_job()

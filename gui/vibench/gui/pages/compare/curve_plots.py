@@ -33,8 +33,8 @@ from vibench.analysis import (
 from ...forms.editor import Choice
 from ...plots.axis import LOG_FREQUENCY, PlotAxis, Scale
 from ...plots.line_style import GUIDE, Dash, LineStyle, curve_style, dashed_pen
-from ...plots.markers import Markers
 from ...plots.plot import Plot
+from ...plots.plot_stack import Markers
 from ...widgets.boxes import fill_box, hint_in_list, label_for, plain_tip, splitter
 from ...widgets.read_table import ReadTable
 from ...widgets.theme import Theme
@@ -103,7 +103,7 @@ PEAK_HEADINGS = (
 
 
 class NumberTable(ReadTable):
-    """Read-only table with a variable number of columns; the first one takes the remaining width."""
+    """Read-only table with a variable number of columns; the first column takes the remaining width."""
 
     def __init__(self, name: str, hint: str) -> None:
         super().__init__(name, PEAK_HEADINGS[:1], hint)
@@ -138,7 +138,7 @@ def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-# Cache peaks: a chaotic curve has thousands, which are needed whenever a curve is ticked.
+# Cache the peaks: a chaotic curve has thousands of peaks, needed each time a curve is selected.
 _peaks = lru_cache(maxsize=64)(curve_peaks)
 
 
@@ -168,10 +168,11 @@ _DASHES = {
     CurveOrigin.PREDICTED: (Dash.LONG, Dash.DASH_DOT_DOTTED),
     CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
     CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
+    CurveOrigin.UNDECIDED: (Dash.LONG, Dash.DASH_DOT_DOTTED),
 }
 """Dash patterns by origin of a curve: first for transmissibility or Response I, then for Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
-"""Kinds of curves visible at first; Response II is hidden, as it equals Response I without contact."""
+"""Kinds of curves visible at first; Response II is hidden, because without contact it equals Response I."""
 _SWATCH = (28, 12)
 
 
@@ -298,7 +299,7 @@ _NOBODY = "– nothing –"
 
 
 class PairBox(QGroupBox):
-    """Two lists to choose a curve and its reference; by default, the second visible curve and the first."""
+    """Two lists to choose a curve and its reference; by default the second and the first visible curve."""
 
     changed = Signal()
 
@@ -315,7 +316,7 @@ class PairBox(QGroupBox):
         form.addRow(self.summary)
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
-        """Offer these curves for selection; keep the selected ones if possible."""
+        """Offer these curves for selection; keep the present selection if possible."""
         self._curves = {_name(each): each for each in curves}
         names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):
@@ -331,7 +332,7 @@ class PairBox(QGroupBox):
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
     def difference(self) -> CurveDifference | None:
-        """Return the difference of the two curves and describe it; None if they cannot be compared."""
+        """Return the difference of the two curves, and describe it; None if the curves cannot be compared."""
         pair = self.pair()
         self.summary.setText("")
         if pair is None:

@@ -14,7 +14,7 @@ from vibench.acquisition.recording import Recording, name_now
 from vibench.analysis.live import RecordingOverview, has_overview, kept_levels
 from vibench.sim.background import Job
 
-from ...background.background import LatestRequest, in_next_pass
+from ...background import LatestRequest, in_next_pass
 from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext
 from ...page.page import DisplayedResult, FileKind, Page, PageParts
@@ -54,7 +54,7 @@ class FilesPage(Page):
         self.pictures = Pictures(context.theme, context.background)
         self.time_histories = self.pictures.time_histories
         self.campaigns = CampaignChoice()
-        self.campaigns.chosen.connect(self.table.show_only)
+        self.campaigns.chosen.connect(self.table.shown_rows.show_only)
         self._opened: Recording | None = None
         self._pictured = DisplayedResult(lambda: self._opened and self._opened.path, self.pictures)
         views = self.pictures.spectrogram, self.pictures.hidden_motion
@@ -72,7 +72,7 @@ class FilesPage(Page):
         browser = ScrollArea("List of recordings", self._browser())
         parts.show_parts(browser, ScrollArea("Open recording", self._viewer()), (200, 600))
         fill_box(QVBoxLayout(self), parts)
-        QWidget.setTabOrder(self._note, self.table)  # from the table, Tab leads to the histories
+        QWidget.setTabOrder(self._note, self.table)  # from the table, Tab moves to the time histories
         self.time_histories.range_changed.connect(self._say_view)
         self.time_histories.markers.moved.connect(self._say_view)
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
@@ -120,7 +120,7 @@ class FilesPage(Page):
         self._wanted = path
         if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
-        # Open the file only after the page is shown; both at once would block the event loop too long.
+        # Show the page, then open the file: doing both at once would block the event loop too long.
         in_next_pass(self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
@@ -134,7 +134,7 @@ class FilesPage(Page):
         entries, shown = found.recordings, self.table.recordings
         self.table.is_listing = False
         self.campaigns.offer(found.campaigns)
-        # The late result of an older selection must not replace a newer one.
+        # A late list must not restore an older selection: use the newest.
         chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
         self._wanted = None
         shown.show_entries(entries)
@@ -143,7 +143,7 @@ class FilesPage(Page):
         if missing:
             self.context.background.ask(thumbnails, shown.show_thumbnails, self.context.fail, missing)
         if chosen:
-            # A recording that was still being written may have its final name now.
+            # A recording that has ended since the last list has a new name.
             self.table.choose(*map(name_now, chosen))
         elif entries and self._opened is None:
             self.table.selectRow(0)
@@ -151,7 +151,7 @@ class FilesPage(Page):
     def _open_chosen(self) -> None:
         paths = self.table.chosen_paths()
         if paths and paths != (self._wanted,):
-            self._wanted = None  # the user has selected other recordings since
+            self._wanted = None  # the user has since selected others
         for button in (self._compare, self._export, self._note):
             button.setEnabled(bool(paths))
         if paths and (self._opened is None or self._opened.path != paths[0]):
@@ -174,7 +174,7 @@ class FilesPage(Page):
         self._opened = recording
         self._title.setText(recording.path.name)
         if recording.path != path:
-            # After the folder was listed, the recording ended and so got another name.
+            # The recording ended after the folder was listed, so its name has changed.
             self._wanted = recording.path
             self.list_folder()
         if recording.samples == 0:
@@ -201,7 +201,7 @@ class FilesPage(Page):
         self._making = None
         if self._opened is None:
             return
-        # Check the seal only after drawing the plots, because the check takes as long as the drawing.
+        # Draw the plots before checking the seal, which takes as long as drawing.
         QTimer.singleShot(PAINTED_MS, self, self._show_facts)
         if not self._opened.is_growing:
             self._check.ask(self._opened.path)
@@ -286,7 +286,7 @@ class FilesPage(Page):
         search = LineField()
         search.setPlaceholderText("name, state, excitation…")
         search.setClearButtonEnabled(True)
-        search.textChanged.connect(self.table.search)
+        search.textChanged.connect(self.table.shown_rows.setFilterFixedString)
         self._goes_to = ElidedLabel(rank="second")
         self._count = ElidedLabel(rank="second")
         bar = row(

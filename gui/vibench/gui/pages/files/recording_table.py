@@ -116,7 +116,7 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
         try:
             points = read_journal(path)
         except RecordingError:
-            # A file of another program may have this suffix.
+            # The file may belong to another program.
             continue
         files = frozenset(path.parent / each.file for each in points if each.file)
         name = path.name.removesuffix(JOURNAL_SUFFIX)
@@ -139,7 +139,7 @@ def add_note(path: Path, text: str) -> Path:
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Return the plan's notes, then later notes, oldest first; an error text if they cannot be read."""
+    """Return the plan's notes, then later notes, oldest first; if unreadable, an error text."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
     try:
@@ -242,7 +242,7 @@ class CampaignChoice(Choice):
         self.hide()
 
     def offer(self, campaigns: tuple[ListedCampaign, ...]) -> None:
-        """Offer these campaigns for selection, and keep the selected one."""
+        """Offer these campaigns for selection, and keep the present selection."""
         before = self.currentIndex()
         name = self._campaigns[before - 1].name if before > 0 else ""
         self._campaigns = campaigns
@@ -272,7 +272,7 @@ THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
 
 
 Cell = tuple[str, str | float]
-"""Text of a table cell, and the value by which its column is sorted."""
+"""Text of a table cell, and the value by which the column is sorted."""
 
 
 class RecordingModel(QAbstractTableModel):
@@ -287,7 +287,7 @@ class RecordingModel(QAbstractTableModel):
         self._pictures: dict[Path, QPixmap] = {}
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """Replace the list of recordings if it differs; keep the thumbnails of files in both lists."""
+        """Replace the list of recordings if it has changed; keep the thumbnails of files in both lists."""
         if entries == self.entries:
             return
         self.beginResetModel()
@@ -362,7 +362,9 @@ class RecordingModel(QAbstractTableModel):
         return self._pictures.get(path)
 
 
-class _ChosenRows(QSortFilterProxyModel):
+class ShownRows(QSortFilterProxyModel):
+    """Sorted rows of the table that match the search text and belong to the selected campaign."""
+
     _only: frozenset[Path] | None = None
 
     def show_only(self, paths: frozenset[Path] | None) -> None:
@@ -386,12 +388,12 @@ class RecordingTable(QTableView):
         make_readable(self, "Recordings")
         self.is_listing = False
         self.recordings = RecordingModel(theme)
-        self._sorted = _ChosenRows(self)
-        self._sorted.setSourceModel(self.recordings)
-        self._sorted.setSortRole(SORT_ROLE)
-        self._sorted.setFilterKeyColumn(-1)
-        self._sorted.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
-        self.setModel(self._sorted)
+        self.shown_rows = ShownRows(self)
+        self.shown_rows.setSourceModel(self.recordings)
+        self.shown_rows.setSortRole(SORT_ROLE)
+        self.shown_rows.setFilterKeyColumn(-1)
+        self.shown_rows.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+        self.setModel(self.shown_rows)
         self.setSortingEnabled(True)
         self.sortByColumn(HEADINGS.index("Began"), Qt.SortOrder.DescendingOrder)
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
@@ -405,7 +407,7 @@ class RecordingTable(QTableView):
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw a hint while the table is empty."""
         super().paintEvent(event)
-        if self._sorted.rowCount() == 0:
+        if self.shown_rows.rowCount() == 0:
             words = "No recordings in this folder yet: choose another folder, or run a test (Ctrl+3)."
             if self.recordings.entries:
                 words = "No recording matches the search and the selected campaign."
@@ -417,22 +419,14 @@ class RecordingTable(QTableView):
         """Redraw the thumbnails in the colours of another theme."""
         self.recordings.retheme(theme)
 
-    def search(self, text: str) -> None:
-        """Show only the rows that contain the text."""
-        self._sorted.setFilterFixedString(text)
-
-    def show_only(self, paths: frozenset[Path] | None) -> None:
-        """Show only the rows of these files; None shows all rows."""
-        self._sorted.show_only(paths)
-
     def chosen_paths(self) -> tuple[Path, ...]:
         """Return the files of the selected rows, from top to bottom."""
         rows = sorted(self.selectionModel().selectedRows(NAME), key=lambda index: index.row())
         return tuple(index.data(PATH_ROLE) for index in rows)
 
     def choose(self, *paths: Path) -> None:
-        """Select the rows of these files only; if none of them is listed, keep the selection."""
-        indices = [self._sorted.index(row, NAME) for row in range(self._sorted.rowCount())]
+        """Select the rows of these files only; if none of these files is listed, keep the selection."""
+        indices = [self.shown_rows.index(row, NAME) for row in range(self.shown_rows.rowCount())]
         wanted = [index for index in indices if index.data(PATH_ROLE) in paths]
         if not wanted:
             return

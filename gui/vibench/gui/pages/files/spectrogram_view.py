@@ -1,4 +1,4 @@
-"""Plots of a recording in the visible time range: over time, spectrogram, estimated motion of m1."""
+"""Plots of a recording in the visible time range: signals, spectrogram and estimated motion of m1."""
 
 from collections.abc import Callable
 from math import nan
@@ -23,7 +23,7 @@ from vibench.analysis.live import (
 )
 from vibench.sim import shipped_specimens
 
-from ...background.background import Background, LatestRequest
+from ...background import Background, LatestRequest
 from ...forms.editor import Choice
 from ...page.page import DisplayedResult
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis
@@ -70,13 +70,13 @@ class _RangePicture(QWidget, Generic[Request, Found]):
         return self._latest_request.is_busy
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Show another recording, or none; ``hint`` is shown until there is a plot."""
+        """Show another recording, or no recording; ``hint`` is shown until there is a plot."""
         self._recording = recording
         self._latest_request.drop()
         self._clear(hint)
 
     def show_view(self, low_s: float, high_s: float) -> None:
-        """Compute the plot of a time range [s], if this tab is visible."""
+        """If this tab is visible, compute the plot of a time range [s]."""
         self._view_s = (low_s, high_s)
         self._ask()
 
@@ -96,7 +96,7 @@ class _RangePicture(QWidget, Generic[Request, Found]):
             return
         self._request = request
         self.result.mark()
-        self.caption.setText("working it out…")
+        self.caption.setText("estimating…")
         self._latest_request.ask(request)
 
     def _show(self, found: Found) -> None:
@@ -235,7 +235,7 @@ class SpectrogramView(_RangePicture[SpectrogramRequest, DensityPicture]):
         return self._images[self._spacing]
 
     def show_recording(self, recording: Recording | None, hint: str) -> None:
-        """Show another recording, or none, and list its channels for selection."""
+        """Show another recording, or no recording, and list the recording's channels for selection."""
         super().show_recording(recording, hint)
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
@@ -370,7 +370,7 @@ class Pictures(QTabWidget):
         self.spectrogram.zoomed.connect(self.time_histories.show_range)
 
     def show_recording(self, overview: RecordingOverview | None, hint: str) -> None:
-        """Show another recording, or none; ``hint`` explains empty plots."""
+        """Show another recording, or no recording; ``hint`` explains empty plots."""
         recording = None if overview is None else overview.recording
         for picture in (self.spectrogram, self.hidden_motion):
             picture.show_recording(recording, hint)

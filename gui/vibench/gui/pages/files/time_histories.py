@@ -13,9 +13,8 @@ from vibench.analysis.live import RecordingOverview, zigzag
 
 from ...plots.axis import TIME, PlotAxis
 from ...plots.line_style import LIMIT, Dash, LineStyle, curve_style
-from ...plots.markers import Markers
 from ...plots.plot import Plot
-from ...plots.plot_stack import AXIS_EM, PlotStack
+from ...plots.plot_stack import AXIS_EM, Markers, PlotStack
 from ...widgets.theme import Theme
 from ...widgets.units import plain_unit
 from .recording_table import role_text
@@ -40,7 +39,7 @@ class _TimeHistory:
 
 
 class RecordingTimeHistories(PlotStack):
-    """Plots over a common time axis. Wheel, + and - zoom; arrow keys and dragging move; Home shows all."""
+    """Plots over a common time axis. Wheel, + and - zoom; arrow keys and dragging scroll; Home shows all."""
 
     range_changed = Signal()
 
@@ -52,7 +51,7 @@ class RecordingTimeHistories(PlotStack):
         self._histories: list[_TimeHistory] = []
         self._kept: dict[tuple[str, str], _TimeHistory] = {}
         self.markers = Markers(0.0, 0.0, self)
-        # One movement of the view may change the visible range several times. Draw after the last change.
+        # One move of the view may change the range several times: draw only after the last change.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._draw)
 
@@ -173,7 +172,7 @@ class RecordingTimeHistories(PlotStack):
         plot.show()
 
     def _forget_others(self) -> None:
-        """Delete plots that this recording does not use if more plots are kept than allowed."""
+        """If more plots are kept than allowed, delete plots that this recording does not use."""
         for kind, history in list(self._kept.items()):
             if len(self._kept) > _MOST_KEPT and history not in self._histories:
                 del self._kept[kind]
@@ -223,5 +222,5 @@ class RecordingTimeHistories(PlotStack):
             if known[0].size:
                 bottom, top = float(known[0].min()), float(known[1].max())
                 height = (top - bottom) or 1e-9
-                # Leave room at the top for the channel name, which must not cover the signal.
+                # Leave space for the channel name at the top, so that it does not cover the signal.
                 history.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)

@@ -65,7 +65,7 @@ def with_sweep(
 
 
 def remove_entry(campaign: Campaign, number: int) -> Campaign | None:
-    """Return the campaign without one test or sweep; None if no other is left."""
+    """Return the campaign without one test or sweep; None if no other entry is left."""
     measurements, sweeps = _dump_all(campaign.measurements), _dump_all(campaign.sweeps)
     entries = [*measurements, *sweeps]
     del entries[number]
@@ -163,7 +163,7 @@ def point_rows(
 
 @dataclass(frozen=True)
 class CampaignPreview:
-    """Summary of a campaign: entries, drive levels, existing recordings, duration and file size."""
+    """Summary of a campaign: entries, drive levels, existing recordings, duration, and file size."""
 
     rows: tuple[tuple[str, str, str, str], ...]
     levels: Mapping[str, str]
@@ -172,7 +172,7 @@ class CampaignPreview:
     """Names of the recordings that are already complete in the folder."""
     duration_s: float
     size_bytes: float | None
-    """Size of the files [bytes]; None without a rig, which defines the sample rate."""
+    """Size of the files [bytes]; None without a rig, because the rig defines the sample rate."""
 
 
 def preview_campaign(request: tuple[Campaign, Rig | None, Path]) -> CampaignPreview:
@@ -186,6 +186,6 @@ def preview_campaign(request: tuple[Campaign, Rig | None, Path]) -> CampaignPrev
     try:
         planned = planned_recordings(campaign, folder, ExistingRecordings.RESUME)
         complete = frozenset(each.name for each in planned if each.is_complete)
-    except AcquisitionError:  # the folder's recordings belong to another plan; arming will report this
+    except AcquisitionError:  # the recordings belong to another plan, as arming will report
         complete = frozenset()
     return CampaignPreview(rows, levels, complete, campaign.duration_s, size)

@@ -31,7 +31,7 @@ from vibench.acquisition.plan import Campaign, Range, RangeSpacing, SweepAxis
 from vibench.acquisition.rig import Rig
 from vibench.sim import count_text
 
-from ...background.background import LatestRequest
+from ...background import LatestRequest
 from ...forms.editor import Choice
 from ...forms.model_form import complaints_of
 from ...forms.quantity_edit import QuantityEdit
@@ -125,7 +125,7 @@ LOOK_MS = 50
 
 
 class QueuePage(Page):
-    """Page that edits the next campaign and shows the running one."""
+    """Page that edits the next campaign and shows the running campaign."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -139,7 +139,7 @@ class QueuePage(Page):
             "Load a campaign above, or add the test of the Test page, once or as a sweep.",
             wide=1,
         )
-        # Give the second column the remaining width; otherwise its width would be only a few letters.
+        # Without this, the remaining width for the second column would be only a few letters.
         self.entries.setMinimumWidth(25 * self.fontMetrics().height())
         self.rows = ReadTable(
             "Recordings of the campaign",
@@ -249,7 +249,7 @@ class QueuePage(Page):
             self.entries.show_rows(())
             for result in self.displayed_results:
                 result.show(None)
-            self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
+            self.summary.setText("No campaign yet: open a campaign, or add the test of the Test page.")
             return
         self.edits.note(campaign)
         self.summary.setText(f"{campaign.name}: …")
@@ -298,7 +298,7 @@ class QueuePage(Page):
 
     @property
     def _chosen_entry(self) -> int:
-        """Row number of the selected test or sweep; -1 if none is selected, or the table is outdated."""
+        """Row number of the selected test or sweep; -1 if no row is selected, or if the table is outdated."""
         return self.entries.currentRow() if self.entries.isEnabled() else -1
 
     def _remove(self) -> None:

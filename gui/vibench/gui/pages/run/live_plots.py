@@ -1,6 +1,5 @@
 """Live plots of a run: time histories, spectra, responses, phase portrait and motion of m1."""
 
-from collections.abc import Mapping
 from functools import partial
 from math import nan
 
@@ -16,23 +15,11 @@ from vibench.analysis.live import LiveView, Portrait, zigzag
 
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, PlotAxis, Scale
 from ...plots.line_style import LIMIT, PREDICTED, Dash, LineStyle, curve_style
-from ...plots.plot import Plot
+from ...plots.plot import Curves, Plot, show_fields
 from ...plots.plot_stack import PlotStack
 from ...widgets.boxes import fill_box
 from ...widgets.theme import Colour, Theme
 from ...widgets.units import UNITS, SentenceLabel, plain_unit
-
-Curves = Mapping[str, pg.PlotDataItem]
-"""Curves of the plot, keyed by the result's field that each curve shows."""
-
-
-def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
-    """Draw the results of a prediction over frequency; None clears the curves."""
-    for name, curve in curves.items():
-        if seen is None:
-            curve.clear()
-        else:
-            curve.setData(seen.prediction.frequency_hz, getattr(seen.prediction, name))
 
 
 class SweepPlot(QWidget):
@@ -54,19 +41,17 @@ class SweepPlot(QWidget):
         if newest_s == self._newest_s:
             return
         self._newest_s = newest_s
-        for name, curve in self.measured.items():
-            curve.setData(history.frequency_hz, getattr(history, name))
+        show_fields(self.measured, history)
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
         """Draw a prediction and its frequency ranges with collisions behind the points; None clears both."""
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
-        show_predicted(self.predicted, seen)
+        show_fields(self.predicted, seen and seen.prediction)
 
     def clear(self) -> None:
         """Remove the measured points."""
         self._newest_s = None
-        for curve in self.measured.values():
-            curve.clear()
+        show_fields(self.measured, None)
 
 
 def sweep_history(theme: Theme) -> SweepPlot:
@@ -77,7 +62,7 @@ def sweep_history(theme: Theme) -> SweepPlot:
     made = SweepPlot("Responses", plot)
     made.predicted = {
         "response_i": plot.curve(PREDICTED, "I, simulated"),
-        "response_ii": plot.curve(LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "II, simulated"),
+        "response_ii": plot.curve(curve_style(0, Dash.DOTTED), "II, simulated"),
         "linear": plot.curve(curve_style(2, Dash.DOTTED), "linear, simulated"),
     }
     made.measured = {
@@ -119,7 +104,7 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 
 
 AGO = PlotAxis("Time before now", "s")
-"""Common time axis, which stands still because a scrolling axis would be repainted in every frame."""
+"""Common time axis, which does not move, because a scrolling axis would be repainted in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
 """Smallest and largest number of columns in which a signal is drawn; a column per pixel leaves no gap."""
 UP_EM = 4.0
@@ -226,7 +211,7 @@ class TransmissibilityPlot(QWidget):
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
         """Draw the predicted transmissibility behind the estimates; None clears the prediction."""
-        show_predicted(self._predicted, seen)
+        show_fields(self._predicted, seen and seen.prediction)
 
     def clear(self) -> None:
         """Clear the plot of the transmissibility."""
@@ -332,7 +317,7 @@ class PortraitPlot(QWidget):
 _FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
-"""Number of shades of the forecast curve; the faintest marks an error of a quarter of the gap."""
+"""Number of shades of the forecast curve; the faintest shade marks an error of a quarter of the gap."""
 _WORTH_OF_GAP = 0.25
 _AHEAD_S, _BACK_S = 0.025, 0.05
 _HINT = "Motion p of m1 between its stops; shown while a test runs with the live twin."
@@ -364,7 +349,7 @@ class HiddenMotionPlot(QWidget):
         self.clear()
 
     def show_status(self, status: EngineStatus | None) -> None:
-        """Draw the newest estimate of the live twin, if there is a newer one."""
+        """Draw the newest estimate of the live twin, if it has changed since it was drawn."""
         twin = None if status is None else status.twin
         if twin is None:
             self.clear()

@@ -22,7 +22,7 @@ from vibench.acquisition.recording import REJECTED
 from vibench.acquisition.rig import channels_of
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
-from ...engine_link.bridge import find_measurement
+from ...engine_link import find_measurement
 from ...forms.editor import Choice
 from ...forms.quantity_edit import LineField
 from ...page.app_context import AppContext
@@ -125,7 +125,7 @@ class LevelMeters(QWidget):
 
 
 SPANS_S = (0.05, 0.2, 1.0, 2.0, 5.0, 10.0)
-"""Time ranges of the time histories that can be chosen [s]."""
+"""Time ranges that can be chosen for the time histories [s]."""
 
 
 class WatchCard(QGroupBox):
@@ -151,7 +151,7 @@ class WatchCard(QGroupBox):
         self.twin = QCheckBox("Live twin")
         self.twin.setToolTip(
             "Estimate the motion of m1 between its stops, and report changes of the specimen. The estimate "
-            "runs in a separate process, so the measurement never waits"
+            "runs in a separate process, so the measurement never waits for the estimate"
         )
         self.twin.clicked.connect(
             lambda is_on: self.twin_requested.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
@@ -186,7 +186,7 @@ class WatchCard(QGroupBox):
         if run is None or not is_running or not averages:
             self._begun = 0
         else:
-            # While the next average settles, the status still has the number of the previous average.
+            # While an average settles, the status still contains the number of the previous average.
             self._begun = int(run.numbers.get("realisation", self._begun - 1)) + 1
         self.reject_button.setEnabled(self._begun > 0)
         self.averages.setText(f"{self._begun} of {averages}" if self._begun else "–")
@@ -222,7 +222,7 @@ def _progress_text(run: RunStatus) -> str:
 
 
 _HINTS = {
-    EngineState.CLOSED: "No bench is open. Open one on the Rig page (Ctrl+1).",
+    EngineState.CLOSED: "No bench is open. Open a bench on the Rig page (Ctrl+1).",
     EngineState.OPENING: "The bench is being opened.",
     EngineState.CHECKING: "The bench is being checked.",
     EngineState.FAULT: "The bench is not usable. Open it again on the Rig page (Ctrl+1).",
@@ -236,7 +236,7 @@ class ArmCard(QGroupBox):
     """Buttons to arm, start, cancel and hold, with the description of the armed plan."""
 
     news = Signal()
-    """Emitted when another plan was armed, whose description must be shown from the beginning."""
+    """Emitted when another plan was armed; its description must be shown from the beginning."""
 
     def __init__(self, actions: UserActions) -> None:
         super().__init__("What will happen")
@@ -268,7 +268,7 @@ class ArmCard(QGroupBox):
         return self._read == self._armed
 
     def show_status(self, status: EngineStatus | None, test: str, reason: str) -> None:
-        """Show the possible commands; ``reason`` says why the test cannot be armed (empty if it can)."""
+        """Show the possible commands; ``reason`` says why the test cannot be armed, or is empty."""
         state = EngineState.CLOSED if status is None else status.state
         armed = None if status is None else status.armed
         is_armed = state is EngineState.ARMED and armed is not None
@@ -290,7 +290,7 @@ class ArmCard(QGroupBox):
         if words != self._armed:
             self._armed, self._read = words, ()
             if words:
-                # Focus Cancel, so that the key press that armed the plan cannot start it as well.
+                # Give Cancel the focus: the key press that armed the plan then cannot also start it.
                 self.cancel_button.setFocus()
                 self.news.emit()
         self.start_button.setEnabled(self.is_read)
@@ -307,7 +307,7 @@ LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | Portrait
 
 
 class RunPage(Page):
-    """Page that displays the engine's run; it keeps no data of the run itself."""
+    """Page that displays the engine's run; the page itself keeps no data of the run."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -355,7 +355,7 @@ class RunPage(Page):
             test, reason = f"{measurement.name} ({kind.label})", ""
         self.arm_card.show_status(status, test, reason)
         if self.context.bridge.is_driving and not self._was_driving:
-            # The focused button was just hidden; without this, Qt would move the focus to the next list.
+            # The button with the focus was just hidden. Otherwise Qt would move the focus to the next list.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
         played = self._measurement
@@ -421,7 +421,7 @@ class RunPage(Page):
             shown_beside.show_prediction(prediction)
         if measurement is not None:
             for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
-                # Fix the range: a preceding check plays outside the band, and would compress the plot.
+                # Fix the range, because samples of an earlier check outside the band would compress the plot.
                 plot.setXRange(*measurement.excitation.band_hz, padding=0.03)
         has_a_band = measurement is None or measurement.excitation.family is Family.NOISE
         self.left_tabs.setCurrentWidget(self.frequency_response if has_a_band else self.history)
@@ -481,7 +481,7 @@ class RunPage(Page):
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
         self.watch_card.reject_requested.connect(self._reject)
-        # Redraw at once: until the next tick, plots of a finished run would look like those of this run.
+        # Redraw at once: before the next tick, the plots of a finished run would seem to show this run.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_requested.connect(self._turn_twin)
         self.context.recording_made.connect(self._show_end)

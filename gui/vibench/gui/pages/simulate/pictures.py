@@ -6,9 +6,10 @@ from functools import partial
 from math import log10
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtWidgets import QGridLayout, QStackedWidget, QWidget
 
-from vibench.analysis import SIMILARITY_THRESHOLD
+from vibench.analysis import SIMILARITY_THRESHOLD, CurveOrigin
 from vibench.analysis.dynamics import BranchDiagram, ChainAnswer, ChainDrive, ChainRun, ExponentSpectrum
 from vibench.analysis.prediction.progress import SimulationProgress
 from vibench.sim import Parameter
@@ -19,6 +20,7 @@ from ...plots.plot import Plot
 from ...widgets.boxes import column
 from ...widgets.theme import Theme
 
+Values = NDArray[np.float64]
 LEVEL = PlotAxis("Base amplitude A0", "m")
 RESPONSES = (
     ("response_i", PlotAxis("Response I of m0, max |x| / A0", short="Response I", scale=Scale.LOGARITHMIC)),
@@ -31,6 +33,7 @@ EXPONENT = PlotAxis("Lyapunov exponents", "1/s", short="Exponents")
 DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")
+_DASHES = {CurveOrigin.STABLE: Dash.SOLID, CurveOrigin.UNSTABLE: Dash.DASHED}
 _FIRST_SPECIAL_COLOUR = 1
 """Colour number of the first event kind in `_SPECIAL`; 0 is for motions with the drive's period."""
 
@@ -64,11 +67,11 @@ class _PairPicture:
 
 
 class BranchPicture(_PairPicture):
-    """Branches: stable parts solid, unstable ones dashed, coloured by period, with events marked."""
+    """Branches: stable parts solid, unstable parts dashed, undecided parts dotted; colour: period."""
 
     def __init__(self, theme: Theme) -> None:
         axes = RESPONSES[0][1], RESPONSES[1][1]
-        hint = "Periodic motions, drawn when found: solid if stable, dashed if unstable."
+        hint = "Periodic motions, drawn when found: solid if stable, dashed if unstable, dotted if undecided."
         titles = ("Response I of branches", "Response II of branches")
         super().__init__(theme, titles, axes, hint)
 
@@ -78,10 +81,10 @@ class BranchPicture(_PairPicture):
         pair = self.clear(along)
         named: set[str] = set()
         for line in answer.lines:
-            for is_stable, piece in line.pieces():
-                style = curve_style(line.periods - 1, Dash.SOLID if is_stable else Dash.DASHED)
+            for stability, piece in line.pieces():
+                style = curve_style(line.periods - 1, _DASHES.get(stability, Dash.DOTTED))
                 period = "" if line.periods == 1 else f", period {line.periods}"
-                name = f"{'stable' if is_stable else 'unstable'}{period}"
+                name = f"{stability.name.lower()}{period}"
                 for plot, (what, _) in zip(pair, RESPONSES, strict=True):
                     curve = plot.curve(style, "" if name in named else name)
                     curve.setData(line.axis_values(along)[piece], getattr(line, what)[piece, 0])
@@ -124,10 +127,10 @@ def _with_interval(
     number: int,
     name: str,
     *,
-    place: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
-    low: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
-    middle: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
-    high: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]",
+    place: Values,
+    low: Values,
+    middle: Values,
+    high: Values,
 ) -> None:
     known = np.isfinite(low) & np.isfinite(middle) & np.isfinite(high)
     if not known.any():
@@ -144,7 +147,7 @@ PLACE = PlotAxis("Cell, from the base", short="Cell")
 ENERGY = PlotAxis("Mean energy of a cell", "µJ", factor=1e6, short="Energy", scale=Scale.LOGARITHMIC)
 _GAP = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _SMALLEST = 1e-8
-"""Lowest drawn transmissibility; smaller ones are drawn at this value."""
+"""Lowest drawn transmissibility; smaller values are drawn at this value."""
 _MOST_TRACES = 32
 """Largest number of cells whose motion is drawn; in longer chains, evenly spaced cells are drawn."""
 _HEIGHT = 0.45
@@ -169,7 +172,7 @@ class ChainPicture:
         return self.across, self.motion, self.energies
 
     def show_answer(self, answer: ChainAnswer) -> None:
-        """Draw the results so far."""
+        """Draw the results that exist so far."""
         for plot in self.plots:
             plot.wipe()
         self._show_across(answer)
@@ -220,13 +223,13 @@ DISPLACEMENT = PlotAxis("Displacement", "m")
 _COLLIDING = LineStyle(lambda theme: theme.muted, fill_opacity=0.14)
 _EDGE = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _HINTS = (
-    "Responses I and II of every model, drawn while computed.",
+    "Responses I and II of every model, drawn while they are computed.",
     "The motion of the masses at the frequency given under Signal.",
     "Largest Lyapunov exponents, if chosen under Exponent in the scene.",
-    "Difference of the two models, where both are known.",
+    "Difference between the two models, where both are known.",
 )
 _SMALLEST_DIFFERENCE = 1e-6
-"""Lowest drawn difference; smaller ones are drawn at this value, because zero has no logarithm."""
+"""Lowest drawn difference; smaller values are drawn at this value, because zero has no logarithm."""
 
 
 class AnswerPlots(QWidget):
@@ -252,7 +255,7 @@ class AnswerPlots(QWidget):
         return (self.responses, self.motion, self.exponents, self.likeness)
 
     def show_progress(self, progress: SimulationProgress | None) -> None:
-        """Draw the results so far."""
+        """Draw the results that exist so far."""
         for step in self.steps(progress):
             step()
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -41,20 +42,20 @@ from vibench.acquisition.plan import (
     rows_by_kind,
 )
 from vibench.acquisition.rig import BaseQuantity, Rig
+from vibench.analysis.live import outline, zigzag
 
-from ...background.background import LatestRequest
+from ...background import LatestRequest
 from ...forms.editor import Choice
 from ...forms.model_form import GroupEditor, ValidatedForm
 from ...page.app_context import AppContext, SettingKey
 from ...page.page import DisplayedResult, FileKind, History, Page, SideAndPicture
 from ...page.user_actions import UserActions
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale
-from ...plots.line_style import Dash, LineStyle, curve_style
-from ...plots.plot import Plot
-from ...plots.signal_curve import SHARE_ROLE, BarDelegate, SignalCurve
+from ...plots.line_style import PREDICTED, Dash, LineStyle, curve_style
+from ...plots.plot import Plot, show_fields
 from ...widgets.boxes import column, fill_box, push_button, row, titled_box
 from ...widgets.notice import TEST, Notice, NoticeKind, clock
-from ...widgets.read_table import ReadTable
+from ...widgets.read_table import SHARE_ROLE, BarDelegate, ReadTable
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel, prefixed_unit
 from .test_preview import TestPrediction, TestPreview, predict_test, preview_test
@@ -91,7 +92,7 @@ FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
     },
     {},
 )
-"""Starting values by kind of test; they replace the values of the previous kind."""
+"""Starting values by kind of test; these values replace the values of the previous kind."""
 
 
 class TestForm(ValidatedForm[Measurement]):
@@ -164,27 +165,64 @@ class PredictionPlot(Plot):
         super().__init__("Predicted response and collision regions", FREQUENCY, up, theme)
         self.with_legend()
         self.with_hint("The response of the specimen to this test is being simulated.")
-        self._first = self.curve(
-            LineStyle(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated"
-        )
-        self._second = self.curve(
-            LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated"
-        )
-        self._linear = self.curve(curve_style(2, Dash.DOTTED), "without contact")
+        self._curves = {
+            "response_i": self.curve(PREDICTED, "Response I, simulated"),
+            "response_ii": self.curve(curve_style(0, Dash.DOTTED), "Response II, simulated"),
+            "linear": self.curve(curve_style(2, Dash.DOTTED), "without contact"),
+        }
         self._stripes = self.stripes(COLLISION)
 
     def show_prediction(self, seen: "MeasurementPrediction | None") -> None:
         """Draw a prediction; None clears the plot."""
-        if seen is None:
-            for curve in (self._first, self._second, self._linear):
-                curve.clear()
-        else:
-            found = seen.prediction
-            self._first.setData(found.frequency_hz, np.asarray(found.response_i))
-            self._second.setData(found.frequency_hz, np.asarray(found.response_ii))
-            self._linear.setData(found.frequency_hz, np.asarray(found.linear))
+        show_fields(self._curves, seen and seen.prediction)
         self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
         self.show_everything()
+
+
+MOST_COLUMNS = 3000
+
+
+class SignalCurve:
+    """Curve of a long signal. Only the visible part is drawn; short impacts are visible at any zoom."""
+
+    def __init__(self, plot: Plot, line_style: LineStyle, name: str = "") -> None:
+        self._plot = plot
+        self._curve = plot.curve(line_style, name)
+        self._samples: NDArray[np.float64] = np.empty(0)
+        self._rate_hz = 1.0
+        self._drawn: tuple[int, int, int] | None = None
+        plot.getViewBox().sigXRangeChanged.connect(self._redraw)
+
+    def set_samples(self, samples: NDArray[np.floating], sample_rate_hz: float) -> None:
+        """Set the samples of the signal, shape (samples,)."""
+        self._samples = np.asarray(samples)
+        self._rate_hz = sample_rate_hz
+        self._drawn = None
+        self._draw(0, len(self._samples))
+
+    def _redraw(self, *_: object) -> None:
+        (low_s, high_s), _range = self._plot.getViewBox().viewRange()
+        first = int(np.floor(low_s * self._rate_hz)) - 1
+        last = int(np.ceil(high_s * self._rate_hz)) + 2
+        count = len(self._samples)
+        if self._plot.getViewBox().autoRangeEnabled()[0]:
+            # The axis follows the drawn data, so draw the whole signal.
+            first, last = 0, count
+        self._draw(min(max(first, 0), count), min(max(last, 0), count))
+
+    def _draw(self, first: int, last: int) -> None:
+        columns = min(max(self._plot.columns, 200), MOST_COLUMNS)
+        if (first, last, columns) == self._drawn:
+            return
+        self._drawn = (first, last, columns)
+        visible = self._samples[first:last]
+        if len(visible) <= 2 * columns:
+            self._curve.setData(np.arange(first, last) / self._rate_hz, visible)
+            return
+        low, high = outline(visible, columns)
+        edges = np.arange(columns) * len(visible) // columns
+        time_s = (first + np.repeat(edges, 2)) / self._rate_hz
+        self._curve.setData(time_s, zigzag(np.asarray(low, float), np.asarray(high, float)))
 
 
 _FLOOR = 1e-5
@@ -228,7 +266,7 @@ _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 
 
 class LimitTable(ReadTable):
-    """Table with one row per limit of the rig; a bar shows what fraction of the limit the test reaches."""
+    """Table with one row per limit of the rig; a bar shows the used fraction of the limit."""
 
     def __init__(self) -> None:
         super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
@@ -287,12 +325,12 @@ def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
     parts += [
         _load(check, name) for load, name in _SHOWN.items() for check in seen.checks if check.load is load
     ]
-    parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
+    parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.peak_v / seen.rms_v:.2f}")
     parts.append(f"takes {clock(seen.duration_s)}")
     parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
     if seen.least_growth_time_s is not None:
         parts.append(
-            f"holds motions whose deviations take {seen.least_growth_time_s:.3g} s or more to grow e-fold"
+            f"can hold motions whose deviations take {seen.least_growth_time_s:.3g} s or more to grow e-fold"
         )
     passed = [check for check in seen.checks if not check.is_kept]
     broken = sorted(passed, key=lambda check: not check.forbids)
@@ -344,7 +382,7 @@ class TestPage(Page):
         )
         self.arm_button = push_button(
             "A&rm the test…  (Ctrl+Return)",
-            "Arm, and describe what will be played; nothing plays before Start",
+            "Arm, and describe what will be played; no signal is played before Start",
             self._actions.arm_test,
             "first",
         )
@@ -363,7 +401,7 @@ class TestPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Whether the test is valid and within all limits, and feedback control can stabilise its motion."""
+        """Whether the test is valid and within all limits, and its motion can be stabilised by feedback."""
         return self._preview is not None and self._preview.is_allowed and not self._refusal
 
     @property
@@ -395,7 +433,7 @@ class TestPage(Page):
         if measurement is not None:
             self.edits.note(measurement)
             if inputs == self._requested_inputs:
-                # Only name or notes have changed, so the prediction is still valid.
+                # Only the name or notes have changed: the prediction is still valid.
                 self.context.selection.prediction = seen
                 return
         self._preview, self._refusal = None, ""
@@ -434,7 +472,7 @@ class TestPage(Page):
             self.summary.setText(summary_text(self._preview, self._refusal))
         self.prediction.show_prediction(seen)
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
-        collides = f"Collides at {bands}." if bands else "No collision is predicted."
+        collides = f"Collisions at {bands}." if bands else "No collision is predicted."
         self.prediction_note.setText(
             f"Simulated ({seen.model}), {seen.approach.value}, base amplitude {seen.base_text} from "
             f"{seen.basis}. {collides}"
@@ -486,7 +524,7 @@ class TestPage(Page):
         else:
             self.context.note_file(path)
             self.context.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
-            self._list_tests()  # the folder of tests may contain the file
+            self._list_tests()  # the file may be in the folder of tests
 
     def _open(self) -> None:
         given, _ = QFileDialog.getOpenFileName(self, "Open a test", str(self._own_folder), "Tests (*.toml)")
@@ -528,13 +566,13 @@ class TestPage(Page):
         cells.setRowStretch(1, 2)
         cells.setRowStretch(2, 3)
         for table in (self.limits, self.prediction):
-            # Ignore the preferred heights, so that the preview gets enough height.
+            # If preferred heights are ignored, the preview gets enough height.
             table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         fill_box(QVBoxLayout(self), SideAndPicture(self.context, TEST, left, grid, self.arm_button))
 
 
 def _stored_test(text: str) -> Measurement | None:
-    """Return the test from the settings' text; None if this version does not allow the test."""
+    """Return the test that is stored in the settings as text; None if this version does not allow it."""
     try:
         return validate(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):

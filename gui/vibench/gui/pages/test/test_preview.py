@@ -34,7 +34,7 @@ class TestPrediction:
     recorded_s: float | None
     """Predicted recording time of a test with `until` [s]; None if unknown, or if `until` is not set."""
     refusal: str
-    """Why feedback control on this rig cannot stabilise the motion; empty if it can."""
+    """Why feedback control on this rig cannot stabilise the motion; empty if feedback can do this."""
 
 
 def predict_test(test: TestPreview) -> TestPrediction:

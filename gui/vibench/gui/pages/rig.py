@@ -1,4 +1,8 @@
-"""The Rig page: select a configuration, list the instruments, confirm the knobs, open and check."""
+"""The Rig page: select, open and check a bench.
+
+Select the hardware configuration, confirm the settings that instruments cannot report, open the bench and
+check it. Findings of the check are shown in units with prefixes, such as µV.
+"""
 
 import warnings
 from collections.abc import Callable, Mapping
@@ -33,15 +37,15 @@ from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import KnobSheet, Rig, load_rig
 from vibench.sim import SpecimenWarning
 
-from ...forms.editor import Choice
-from ...forms.quantity_edit import LineField
-from ...page.app_context import AppContext, SettingKey
-from ...page.page import FileKind, Page, SideAndPicture
-from ...page.user_actions import UserActions
-from ...widgets.boxes import column, fill_box, label_for, plain_tip, push_button, tick_box, titled_box
-from ...widgets.notice import RIG, moment_text
-from ...widgets.read_table import ReadTable
-from ...widgets.units import SentenceLabel, prefixed_unit
+from ..forms.editor import Choice
+from ..forms.quantity_edit import LineField
+from ..page.app_context import AppContext, SettingKey
+from ..page.page import FileKind, Page, SideAndPicture
+from ..page.user_actions import UserActions
+from ..widgets.boxes import column, fill_box, label_for, plain_tip, push_button, tick_box, titled_box
+from ..widgets.notice import RIG, moment_text
+from ..widgets.read_table import ReadTable
+from ..widgets.units import SentenceLabel, prefixed_unit
 
 PACES = {"wall": "in real time, like a real bench", "free": "as fast as this computer can"}
 
@@ -58,7 +62,7 @@ class RigChoice(QWidget):
         self._paths: list[Path] = []
         self._rig: Rig | None = None
         self.complaint = self.warning = ""
-        """Error and warnings about the selected file, as text; empty if there are none."""
+        """Error and warnings about the selected file, as text; empty if there are no errors and warnings."""
         self._box, self.pace = Choice(), Choice(items=PACES.values())
         self._box.setToolTip("A real bench needs its instruments; a simulated rig needs none")
         self.pace.setToolTip("Speed of the simulated instruments; a real bench runs in real time")
@@ -87,7 +91,7 @@ class RigChoice(QWidget):
         return self._rig.model_copy(update={"virtual": self._rig.virtual.model_copy(update={"pace": pace})})
 
     def choose(self, path: Path) -> None:
-        """Select a file in the list; add the file to the list if it is missing."""
+        """Select a file in the list; if the file is missing, add it."""
         if path not in self._paths:
             self._add(path)
         row = self._paths.index(path)
@@ -148,7 +152,7 @@ class KnobSheetForm(QGroupBox):
         return tuple(self._ticks.values())
 
     def show_rig(self, rig: Rig | None) -> None:
-        """Show the knobs of a rig, with no knob confirmed."""
+        """Show the knobs of a rig; at first, no knob is confirmed."""
         for tick in self._ticks.values():
             self._layout.removeWidget(tick)
             tick.deleteLater()
@@ -219,7 +223,7 @@ class RigPage(Page):
             "Close bench", "Silence all outputs and close the instruments", self._close
         )
         self.check_button = push_button(
-            "Check bench  (F6)", "Play a small sine; check noise, gains, clocks", self._actions.check
+            "Check bench  (F6)", "Play a small sine; check noise, gains and clocks", self._actions.check
         )
         self.find_button = push_button("Find instruments", "List all instruments found", self._find)
         self.instruments = ReadTable(
@@ -281,21 +285,21 @@ class RigPage(Page):
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
-        """Function that opens a hardware configuration or, while a bench is open, shows a message."""
+        """Function that opens a hardware configuration; while a bench is open, it shows a message instead."""
         return {FileKind.RIG: self._choose}
 
     def _choose(self, path: Path) -> None:
         if self.choice.isEnabled():
             self.choice.choose(path.resolve())
         else:
-            self.context.warn("A bench is open.", "It was kept.", "Close it, then choose another.")
+            self.context.warn("A bench is open.", "It was kept.", "Close this bench, then choose another.")
 
     def open_bench(self) -> None:
         """Open the bench of the selected rig."""
         rig = self.choice.rig
         if rig is not None:
             self.instruments.show_rows([])
-            self.context.selection.choose_rig(rig)  # the rig may differ after taking over an engine
+            self.context.selection.choose_rig(rig)  # another rig may have been taken over
             self.context.bridge.open(rig, self.knobs.sheet())
 
     def _show_check(self, status: EngineStatus | None) -> None:

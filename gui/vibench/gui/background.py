@@ -1,4 +1,9 @@
-"""Run long work without blocking the window: in spawned processes, or step by step in the event loop."""
+"""Work that takes longer than one frame of the display, done in spawned processes.
+
+`Background` runs functions in a pool of processes and polls for results; `LatestRequest` computes only the
+newest request. Functions, arguments and results must be importable and accepted by pickle. Their modules
+must not import Qt widgets, because every worker process imports these modules.
+"""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -17,8 +22,8 @@ Answer = TypeVar("Answer")
 
 
 def in_next_pass(receiver: QObject, step: Callable[[], None]) -> None:
-    """Call ``step`` in the next pass of the event loop, after drawing and input have been handled."""
-    # Do not wait 0 ms: Qt would then call two steps before it serves another timer.
+    """Call ``step`` in the next pass of the event loop, after all drawing and input have been handled."""
+    # Do not wait 0 ms: Qt would then call two steps before calling another timer.
     QTimer.singleShot(1, receiver, step)
 
 
@@ -32,7 +37,7 @@ class Background(Pool, QObject):
         self._timer.timeout.connect(self.poll)
 
     def prepare(self) -> None:
-        """Start all worker processes now; if they started during a run, they would delay the display."""
+        """Start all worker processes now; processes that start during a run would delay the display."""
         super().prepare()
         for beside in self.findChildren(Background):
             beside.prepare()
@@ -59,7 +64,7 @@ class Background(Pool, QObject):
 
 
 class LatestRequest(QObject, Generic[Question, Answer]):
-    """Executor that runs only the newest request, which starts if no other follows within a short time."""
+    """Executor that runs only the newest request, after a short time without another request."""
 
     def __init__(
         self,
@@ -84,7 +89,7 @@ class LatestRequest(QObject, Generic[Question, Answer]):
         return self._wanted is not None or self._job is not None
 
     def ask(self, question: Question) -> None:
-        """Replace the waiting request by this one."""
+        """Replace the waiting request by this request."""
         self._wanted = question
         self._timer.start()
 
@@ -104,7 +109,7 @@ class LatestRequest(QObject, Generic[Question, Answer]):
 
     def _take_answer(self, answer: Answer) -> None:
         self._job = None
-        if not isValid(self):  # the page of this request was deleted meanwhile
+        if not isValid(self):  # this page has been deleted since
             return
         if self._wanted is None:
             self._on_answer(answer)

@@ -1,4 +1,8 @@
-"""The Maps page: the request on the left; on the right, the map above the motion at one point."""
+"""The Maps page: kinds of motion over frequency and amplitude, and the motion at a chosen point.
+
+The map is drawn while it is computed, at first on a coarse grid. Its visible part can be computed again on a
+finer grid. A click shows the motion at that point. Base levels of recordings can be drawn over the map.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -25,18 +29,17 @@ from vibench.analysis.prediction.progress import (
 )
 from vibench.sim.background import Job
 
-from ...forms.editor import Choice
-from ...forms.model_form import ValidatedForm
-from ...page.app_context import AppContext
-from ...page.page import DisplayedResult, Page, SideAndPicture
-from ...page.simulator import Simulator
-from ...plots.axis import FREQUENCY, TIME, PlotAxis, Scale
-from ...plots.line_style import LineStyle, curve_style
-from ...plots.plot import Plot
-from ...widgets.boxes import column, fill_box, push_button, row, splitter, titled_box
-from ...widgets.notice import MAPS, SIMULATE
-from ...widgets.theme import Theme
-from ...widgets.units import SentenceLabel
+from ..forms.editor import Choice
+from ..forms.model_form import ValidatedForm
+from ..page.app_context import AppContext
+from ..page.page import DisplayedResult, Page, SideAndPicture, Simulator
+from ..plots.axis import FREQUENCY, TIME, PlotAxis, Scale
+from ..plots.line_style import LineStyle, curve_style
+from ..plots.plot import Plot
+from ..widgets.boxes import column, fill_box, push_button, row, splitter, titled_box
+from ..widgets.notice import MAPS, SIMULATE
+from ..widgets.theme import Theme
+from ..widgets.units import SentenceLabel
 
 AMPLITUDE = PlotAxis("Base amplitude A0", "m", scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
@@ -48,7 +51,7 @@ SHARPEST = 0.998
 
 
 class MapPlot(QWidget):
-    """Plot of the map: frequency on the horizontal axis, base amplitude on the vertical one."""
+    """Plot of the map: frequency on the horizontal axis, base amplitude on the vertical axis."""
 
     picked = Signal(float, float)
     """Frequency [Hz] and base amplitude [m] of a point that was clicked."""
@@ -115,7 +118,7 @@ class MapPlot(QWidget):
 
 def _class_colours(picture: MapPicture) -> NDArray[np.uint8]:
     colours = [(*pg.mkColor(colour).getRgb()[:3], 255) for _, colour in MOTION_CLASSES]
-    # The last row is the colour of class -1, for points that are not computed yet.
+    # The last row is the colour of class -1, which means points that are not computed yet.
     return np.array([*colours, UNKNOWN], dtype=np.uint8)[picture.classes]
 
 
@@ -182,13 +185,13 @@ class MotionView(QWidget):
 
 
 MAP_SHARE = 640
-"""Height of the map in thousandths of the page's height; the plots of the motion get the rest."""
+"""Height of the map in thousandths of the page's height; the plots of the motion get the remaining height."""
 DIGITS = 5
 """Significant digits of the parameter ranges that a zoom writes into the form."""
 
 
 class MapsPage(Page):
-    """Page that computes one map at a time; starting another map cancels the first."""
+    """Page that computes one map at a time; starting another map cancels the running one."""
 
     def __init__(self, context: AppContext) -> None:
         super().__init__(context)
@@ -288,7 +291,7 @@ class MapsPage(Page):
         self._compare_specimens()
 
     def _compare_specimens(self) -> None:
-        """Warn if the specimen of the map is not the one of a recording drawn on it."""
+        """Warn if the specimen of the map differs from that of a recording drawn on the map."""
         if (request := self.form.value) is not None:
             for difference in (each.difference(request.chosen_specimen) for each in self._levels):
                 if difference:

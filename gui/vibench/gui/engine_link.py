@@ -1,4 +1,9 @@
-"""The connection between window and engine; it receives status and samples, and sends commands."""
+"""The connection between the window and the engine's process.
+
+`Bridge` requests status and samples at every tick, keeps the newest and sends commands. A thread without
+Qt waits for the answers, so that the window does not block. An `Attendant` reports that the window is alive;
+without these reports the engine ramps down (docs/engine.md). A `LiveView` holds the newest samples of a run.
+"""
 
 import threading
 from collections.abc import Callable
@@ -37,11 +42,11 @@ from vibench.acquisition.rig import KnobSheet, Rig
 from vibench.analysis.live import LiveChannel, LiveView
 from vibench.stop_files import SWITCH_OFF
 
-from ..background.background import in_next_pass
-from ..widgets.notice import Notice, NoticeKind, notice_of
+from .background import in_next_pass
+from .widgets.notice import Notice, NoticeKind, notice_of
 
 WHOLE_BAND_HZ = (20.0, 2000.0)
-"""Frequency band of the plots if this window does not know the plan because another window armed the plan."""
+"""Frequency band of the plots if this window does not know the plan, because another window armed it."""
 WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
 
 
@@ -73,7 +78,7 @@ def warm_up() -> None:
 
 
 def find_measurement(campaign: Campaign | None, name: str) -> Measurement | None:
-    """Return the campaign's measurement that is recorded as ``name``; None if there is none."""
+    """Return the campaign's measurement that is recorded as ``name``; None if it does not exist."""
     if campaign is None:
         return None
     return next((each for recording, each in campaign.recordings() if recording == name), None)
@@ -106,7 +111,7 @@ class _Call:
 class EngineLine:
     """Thread without Qt that starts an engine and sends requests; `drain` delivers the answers.
 
-    It only sends requests that the window has just made, so the engine notices if the window freezes.
+    The thread sends only requests that the window has just made, so the engine notices if the window freezes.
     """
 
     def __init__(self, start: Starter = start_engine) -> None:
@@ -122,7 +127,7 @@ class EngineLine:
 
     @property
     def pid(self) -> int | None:
-        """Process id of the engine; None before there is an engine."""
+        """Process id of the engine; None before an engine exists."""
         return None if self._engine is None else self._engine.pid
 
     def ask(
@@ -186,7 +191,7 @@ CATCH_UP_S = 2.0
 """Longest stretch of samples fetched from the engine after a pause [s]; older samples are in the file."""
 
 PIECE_S = 0.2
-"""Duration of samples processed in one pass [s]: four times as much as arrives between two frames."""
+"""Duration of samples processed in one pass [s]: four times the duration that arrives between two frames."""
 
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
@@ -196,7 +201,7 @@ class Bridge(QObject):
     """The only connection between the window and the engine.
 
     It stores only values that the engine reported last. The window's timer calls `tick`, which delivers
-    answers and sends new requests. From these requests the engine sees that the window is alive.
+    answers and sends new requests. These requests show the engine that the window is alive.
     """
 
     noticed = Signal(object)
@@ -213,7 +218,7 @@ class Bridge(QObject):
         self._start = start
         self._line: EngineLine | None = None
         self.status: EngineStatus | None = None
-        """Newest status of the engine; None without an engine."""
+        """Newest status of the engine; None if there is no engine."""
         self.view: LiveView | None = None
         """Newest samples of the run; None before the first run, and after another plan was armed."""
         self._view_run = 0
@@ -227,7 +232,7 @@ class Bridge(QObject):
 
     @property
     def state(self) -> EngineState:
-        """State of the engine; `CLOSED` without an engine."""
+        """State of the engine; `CLOSED` if there is no engine."""
         return EngineState.CLOSED if self.status is None else self.status.state
 
     @property
@@ -242,7 +247,7 @@ class Bridge(QObject):
 
     @property
     def engine_pid(self) -> int | None:
-        """Process id of the engine; None without an engine."""
+        """Process id of the engine; None if there is no engine."""
         return None if self._line is None else self._line.pid
 
     def tick(self) -> None:
@@ -262,7 +267,7 @@ class Bridge(QObject):
             attendant.live()
 
     def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
-        """Open the bench of a rig, after starting an engine if there is none."""
+        """Open the bench of a rig; if there is no engine, start one first."""
         if self._line is None:
             self._line = EngineLine(self._start)
         self.rig = rig
@@ -277,7 +282,7 @@ class Bridge(QObject):
         def keep(found: tuple[Rig, CampaignRequest, EngineStatus]) -> None:
             self.rig, request, self.status = found
             self.campaign, self._attendance = request.campaign, Supervision.UNATTENDED
-            self._emit_news(self.status)  # show the engine's messages now, not at the next tick
+            self._emit_news(self.status)  # show messages before the next tick
             self.adopted.emit(request)
 
         self._order(_adopt, keep)
@@ -305,7 +310,7 @@ class Bridge(QObject):
 
     @property
     def may_leave(self) -> bool:
-        """Whether the plan was armed as a run that continues if the window is closed."""
+        """Whether the plan was armed for a run that continues after the window is closed."""
         return self.is_driving and self._attendance is Supervision.UNATTENDED
 
     def close(self, how: Urgency = Urgency.END) -> None:
@@ -327,7 +332,7 @@ class Bridge(QObject):
         line = self._line
 
         def end_order() -> None:
-            if self._line is line:  # do not count down commands of an engine that has ended
+            if self._line is line:  # commands to an earlier engine do not count
                 self._orders -= 1
 
         def take_answer(answer: Any) -> None:
@@ -372,7 +377,7 @@ class Bridge(QObject):
         self._take(self.view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
-        """Process one batch of samples and schedule the next; all batches at once would block the window."""
+        """Process one batch of samples and schedule the next one; all at once would block the window."""
         view.add(first_sample, volts[:, :size])
         rest = volts[:, size:]
         if rest.shape[1] == 0:
@@ -409,7 +414,7 @@ class Bridge(QObject):
             return
         line, self._line = self._line, None
         self.status, self._last_message, self._ended = None, 0, frozenset()
-        self._orders = self._view_run = 0  # a new engine numbers its runs from 1
+        self._orders = self._view_run = 0  # runs of the next engine start at 1
         line.leave()
         if isinstance(error, EngineSilent):
             self.noticed.emit(notice_of(error, "Then open the bench again on the Rig page."))
