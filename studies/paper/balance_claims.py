@@ -5,11 +5,10 @@ import numpy as np
 from vibench.analysis import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 from vibench.sim import PowerSpring, first_order_states, spring_of, structure_of
 
-from .case import ALIKE, DAMPINGS, NARROWER_FIT
 from .claim import NO_THIRD, Expectation, about, at_least, costly_claim, peaks_at
-from .peaks import nearest, response_peaks, two_highest
+from .options import ALIKE, DAMPINGS, NARROWER_FIT
 from .reading import CONTINUOUS, STRONG_M, WEAK_M, Reading, Values
-from .responses import Reals
+from .responses import Reals, nearest, response_peaks, two_highest
 
 _AGREES = 0.1
 """Largest relative difference that counts as agreement; the paper's similarity criterion, eq. 6, is wider."""
@@ -104,7 +103,7 @@ def balance_strong(r: Reading) -> Values:
 
 def _solutions(r: Reading, amplitude_m: float) -> list[Reals]:
     """Return |x| / A0 of every stable first-order solution, at each frequency of the grid."""
-    specimen = r.specimen(CONTINUOUS)
+    specimen = r.case.specimen(CONTINUOUS)
 
     def solve() -> list[Reals]:
         structure, spring = structure_of(specimen), spring_of(specimen)

@@ -10,7 +10,7 @@ import numpy as np
 
 from vibench.analysis import InvalidRequest
 
-from .case import AS_CHOSEN, DAMPINGS, Alternative, Case
+from .options import AS_CHOSEN, DAMPINGS, Alternative, Case
 from .reading import Evidence, Reading, Values
 
 
@@ -70,6 +70,7 @@ def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectatio
 
 
 NO_THIRD = at_most("third peak over second", "", 0.5)
+Measure = Callable[[Reading], Values]
 
 
 @dataclass(frozen=True)
@@ -83,22 +84,19 @@ class Claim:
     """Method of measurement, in one sentence."""
     limits: tuple[Expectation, ...]
     """Requirements; the claim holds if all of them are met."""
-    measure: Callable[[Reading], Values]
+    measure: Measure
     tried: tuple[Alternative, ...]
     """Alternatives to test, in this order, if the claim fails with the defaults."""
     remark: str
-    """Comment on a failed claim, without measured numbers, because the page states them."""
+    """Comment on a failed claim, without measured numbers, because the page states these numbers."""
     draws: int
-    """Number of initial states: several if the numbers depend on the final motion of a chaotic transient."""
+    """Number of initial states; several if the numbers depend on which motion follows a chaotic transient."""
     is_scored: bool
     """Whether the claim is also measured at every damping of the score."""
 
     def is_met_by(self, values: Values) -> bool:
         """Return whether every number lies within its bounds; NaN lies outside."""
         return all(each.low <= value <= each.high for each, value in zip(self.limits, values, strict=True))
-
-
-Measure = Callable[[Reading], Values]
 
 
 def claim(
@@ -128,14 +126,14 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     HOLDS_FOR_SHARE = "holds for a share of starts"
-    """With the defaults, the claim holds only for some initial states; chance decides for which of them."""
+    """With the defaults, the claim holds only for some initial states, which are a matter of chance."""
     HOLDS_UNDER = "holds under"
     FAILS = "does not hold"
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Numbers of a claim with the options of one case, for every initial state, beginning with rest."""
+    """Numbers of a claim with the options of one case, for every initial state; the first state is rest."""
 
     case: Case
     draws: tuple[tuple[float, ...], ...]
@@ -156,6 +154,11 @@ class Finding:
     def is_met_in_part(self) -> bool:
         """Whether the claim holds for some initial states, but not for all."""
         return 0 < self.met_draws < len(self.draws)
+
+    @property
+    def share(self) -> str:
+        """Number of initial states for which the claim holds, of all initial states, in words."""
+        return f"{self.met_draws} of {len(self.draws)}"
 
     def spread(self, number: int) -> tuple[float, float]:
         """Return smallest and largest value of one number over the initial states; NaN if any is missing."""
@@ -191,20 +194,20 @@ def finding(claim: Claim, evidence: Evidence, case: Case) -> Finding:
     With alternative options, a claim that fails for the motion from rest is not measured from other initial
     states. Raises InvalidRequest when the number of measured values differs from the number of requirements.
     """
-    draws = [_measure(claim, evidence, case)]
-    if claim.is_met_by(draws[0]) or case.name == AS_CHOSEN:
-        draws += [_measure(claim, evidence, replace(case, draw=number)) for number in range(1, claim.draws)]
-    return Finding(case, tuple(draws), sum(claim.is_met_by(values) for values in draws))
 
+    def measure(draw: int) -> tuple[float, ...]:
+        return tuple(map(float, claim.measure(Reading(evidence, replace(case, draw=draw)))))
 
-def _measure(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
-    values = tuple(float(each) for each in claim.measure(Reading(evidence, case)))
-    if len(values) != len(claim.limits):
+    draws = [measure(case.draw)]
+    required, measured = len(claim.limits), len(draws[0])
+    if measured != required:
         raise InvalidRequest(
-            f"the claim {claim.key!r} requires {len(claim.limits)} numbers, but {len(values)} were measured; "
-            "measure one for each requirement"
+            f"the claim {claim.key!r} requires {required} numbers, but {measured} were measured; "
+            "measure one number for each requirement"
         )
-    return values
+    if claim.is_met_by(draws[0]) or case.name == AS_CHOSEN:
+        draws += map(measure, range(1, claim.draws))
+    return Finding(case, tuple(draws), sum(map(claim.is_met_by, draws)))
 
 
 def judgement(claim: Claim, evidence: Evidence, case: Case) -> Judgement:

@@ -4,9 +4,8 @@ import numpy as np
 
 from vibench.analysis import PAPER_TERMINAL_RESONANCES_HZ
 
-from .case import BY_ODE45, DAMPINGS, NARROWER_FIT
 from .claim import at_least, at_most, claim, costly_claim
-from .options import AMPLITUDES_M
+from .options import AMPLITUDES_M, BY_ODE45, DAMPINGS, NARROWER_FIT
 from .reading import CONTINUOUS, MODERATE_M, PIECE_WISE, SECOND_REGION_HZ, STRONG_M, WEAK_M, Reading, Values
 
 SEVERE_PER_S = 100.0
@@ -64,8 +63,7 @@ def severe_wherever_colliding(r: Reading) -> Values:
 
 def _severe(r: Reading, lowest_hz: float, highest_hz: float) -> Values:
     curve = r.level(MODERATE_M)
-    within = (curve.frequency_hz > lowest_hz) & (curve.frequency_hz < highest_hz)
-    colliding = curve.exponent_per_s[curve.collides & within]
+    colliding = curve.exponent_per_s[curve.collides_within(lowest_hz, highest_hz)]
     if not colliding.size:
         return np.nan, np.nan
     return float(np.mean(colliding > SEVERE_PER_S)), float(np.median(colliding))
@@ -73,7 +71,7 @@ def _severe(r: Reading, lowest_hz: float, highest_hz: float) -> Values:
 
 @costly_claim(
     "4, Fig. 10(a, b)",
-    "Smallest increase of the share of exponents above 10 per second, between amplitudes.",
+    "Smallest increase of the share of exponents above 10 per second, from one amplitude to the next.",
     at_least("smallest increase of frequencies, piece-wise", "%", 0.0),
     at_least("n = 5", "%", 0.0),
     tried=(NARROWER_FIT,),

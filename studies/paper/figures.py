@@ -1,14 +1,20 @@
 """The simulated figures of the paper, by number; figures 12 to 14 show the experiment."""
 
-from importlib import import_module
-from pathlib import Path
-from types import ModuleType
+from .drawing import PaperFigure
+from .motion_figures import colliding_and_free, definitions, exponents
+from .response_figures import clearance, continuous, damping, levels
+from .similarity_figures import cubic, extreme_orders, forces, orders
 
-FILES = {
-    int(path.stem.split("_")[1]): path.stem for path in sorted(Path(__file__).parent.glob("figure_*.py"))
+FIGURES: dict[int, PaperFigure] = {
+    1: forces,
+    2: definitions,
+    3: levels,
+    4: colliding_and_free,
+    5: damping,
+    6: continuous,
+    7: cubic,
+    8: orders,
+    9: extreme_orders,
+    10: exponents,
+    11: clearance,
 }
-
-
-def paper_figure(number: int) -> ModuleType:
-    """Return the module of a figure, with functions `studies(options)` and `draw(options, *results)`."""
-    return import_module(f".{FILES[number]}", __package__)

@@ -1,4 +1,4 @@
-"""The page on the claims of the paper, as Markdown and as a report."""
+"""The page on the claims of the paper: its sections, as Markdown and as a report."""
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -10,8 +10,16 @@ from vibench.analysis.report import Agreement, Card, DrawnFigure, Fold, Page, Re
 from vibench.sim import wilson_share
 from vibench.sim.study import software
 
-from .case import Case
+from . import (
+    balance_claims,
+    collision_claims,
+    exponent_claims,
+    resonance_claims,
+    similarity_claims,
+    spectrum_claims,
+)
 from .claim import Claim, Expectation, Finding, Judgement, Verdict, judgement
+from .options import Case
 from .reading import Evidence
 from .settings import DampingScore, claims_by_setting, score_table, scores
 
@@ -25,9 +33,22 @@ The bounds allow for chaos, in which responses differ by some per cent between r
 "Strict reading" takes the paper's words literally. "A over B" is the ratio A / B.
 If the duration of chaos is random, a claim is checked with several starts (initial states a millionth of the
 gap apart), and parentheses show the range of the results. If a claim fails, options are tried in order until
-the claim holds. A0 is the base amplitude, n the power of a continuous contact law, the exponent the largest
-Lyapunov exponent. Similarity is the share of frequencies at which two models agree (eq. 7).
+the claim holds. A0 is the base amplitude, and n is the power of a continuous contact law. "Exponent" is the
+largest Lyapunov exponent. Similarity is the share of frequencies at which two models agree (eq. 7).
 DIR/report.html describes each measurement."""
+SECTIONS: dict[str, tuple[Claim, ...]] = {
+    heading: tuple(each for each in vars(module).values() if isinstance(each, Claim))
+    for heading, module in {
+        "Resonances": resonance_claims,
+        "Collisions": collision_claims,
+        "Chaos": exponent_claims,
+        "Motion at 260 Hz": spectrum_claims,
+        "Analytical solution of the continuous model": balance_claims,
+        "Similarity of the models": similarity_claims,
+    }.items()
+}
+"""Claims by heading; within a section, claims have the order of the section's source file."""
+CLAIMS = tuple(claim for claims in SECTIONS.values() for claim in claims)
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 
@@ -67,13 +88,12 @@ def reproduction(
     sections: Mapping[str, tuple[Claim, ...]], evidence: Evidence, case: Case, on_step: Callable[[str], None]
 ) -> Reproduction:
     """Measure every claim for a case, with its alternatives, at every damping and with every setting."""
-    judgements = {}
-    for heading, claims in sections.items():
-        found = []
-        for claim in claims:
-            on_step(claim.key)
-            found.append(judgement(claim, evidence, case))
-        judgements[heading] = tuple(found)
+
+    def judged(claim: Claim) -> Judgement:
+        on_step(claim.key)
+        return judgement(claim, evidence, case)
+
+    judgements = {heading: tuple(map(judged, claims)) for heading, claims in sections.items()}
     every = [claim for each in sections.values() for claim in each]
     on_step("score by damping")
     by_damping = scores(every, evidence, case)
@@ -90,7 +110,7 @@ def _origin_text(evidence: Evidence) -> str:
     minutes = sum(float(np.nansum(each.values("taken"))) for each in studies) / 60.0
     return (
         f"Computed from {points} simulated points in {len(studies)} studies, "
-        f"{minutes:.0f} minutes of one core, with vibench {json.loads(software())['vibench']}."
+        f"{minutes:.0f} minutes on one core, with vibench {json.loads(software())['vibench']}."
     )
 
 
@@ -134,21 +154,17 @@ def _cells(result: Judgement) -> tuple[str, ...]:
 
 
 def verdict_text(result: Judgement) -> str:
-    """Return the verdict, with the option for which the claim holds."""
-    under, first = result.first_met, result.findings[0]
+    """Return the verdict, and the options for which the claim holds if they are not the defaults."""
+    text, first, under = result.verdict.value, result.findings[0], result.first_met
     match result.verdict:
         case Verdict.HOLDS_FOR_SHARE:
             share = wilson_share(first.met_draws, len(first.draws))
-            return (
-                f"{result.verdict.value}: {first.met_draws} of {len(first.draws)} "
-                f"({100 * share.low:.0f} to {100 * share.high:.0f} %)"
-            )
+            return f"{text}: {first.share} ({100 * share.low:.0f} to {100 * share.high:.0f} %)"
         case Verdict.HOLDS_UNDER if under is not None:
-            return f"holds under {under.case.name}"
+            return f"{text} {under.case.name}"
         case Verdict.FAILS:
-            return f"{result.verdict.value}{_except(result)}"
-        case other:
-            return other.value
+            return "; ".join([text, *(_part_held(each) for each in result.findings if each.is_met_in_part)])
+    return text
 
 
 def target_text(claim: Claim) -> str:
@@ -166,23 +182,18 @@ def _difference(result: Judgement) -> str:
 def _upholding_options(result: Judgement) -> str:
     """Return the options with which a claim holds, the numbers measured with them, and the comment."""
     claim, alternatives = result.claim, result.findings[1:]
-    sentences = [
-        f"{'It holds under' if each.is_met else 'Values with'} {each.case.name}: {_values(claim, each)}."
-        for each in alternatives
-        if each.met_draws > 0
-    ]
+    sentences = []
     if alternatives and result.first_met is None:
-        sentences.insert(0, f"It fails under all options tested ({len(alternatives)}){_except(result)}.")
+        sentences = [f"The claim fails under all options ({len(alternatives)})."]
+    for each in alternatives:
+        if each.met_draws > 0:
+            where = _part_held(each) if each.is_met_in_part else f"the claim holds under {each.case.name}"
+            sentences += [f"{text[0].upper()}{text[1:]}." for text in (where, _values(claim, each))]
     return " ".join([*sentences, claim.remark]).strip()
 
 
-def _except(result: Judgement) -> str:
-    """Return the options with which a claim holds only for some initial states."""
-    return "".join(
-        f"; with {each.case.name} it holds for {each.met_draws} of {len(each.draws)} starts"
-        for each in result.findings
-        if each.is_met_in_part
-    )
+def _part_held(found: Finding) -> str:
+    return f"with {found.case.name} the claim holds for {found.share} starts"
 
 
 def _values(claim: Claim, found: Finding) -> str:
@@ -199,7 +210,7 @@ def _value(wanted: Expectation, found: Finding, number: int) -> str:
 
 def _tests(result: Judgement) -> Iterator[str]:
     for each in result.findings:
-        in_part = f"holds for {each.met_draws} of {len(each.draws)} starts"
+        in_part = f"holds for {each.share} starts"
         mark = in_part if each.is_met_in_part else "holds" if each.is_met else "does not hold"
         yield f"{each.case.name}: {_values(result.claim, each)} ({mark})"
 

@@ -6,11 +6,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from vibench.sim import Harmonic, Observable, Specimen
+from vibench.sim import Harmonic, Observable
 from vibench.sim.study import Study, StudyResults
 
-from .case import Case, ExponentsBy
-from .options import AMPLITUDES_M, WITH_EXPONENT
+from .options import AMPLITUDES_M, WITH_EXPONENT, Case, ExponentsBy
 from .responses import Reals, Responses, responses
 from .textbook_methods import ode45, textbook_exponents
 
@@ -25,7 +24,7 @@ Values = tuple[float | np.floating[Any], ...]
 
 @dataclass(frozen=True)
 class Evidence:
-    """Cache of studies and other results, which computes missing results; shared by all claims."""
+    """Cache of studies and other results, shared by all claims; it computes results that are missing."""
 
     solve: Callable[[Study], StudyResults]
     """Function that solves a study or reads the study's file; raises an error if the study is incomplete."""
@@ -54,10 +53,6 @@ class Reading:
     evidence: Evidence
     case: Case
 
-    def specimen(self, model: str = PIECE_WISE) -> Specimen:
-        """Return the specimen with a contact model."""
-        return self.case.specimen(model)
-
     def curve(self, amplitude_m: float, model: str = PIECE_WISE, **replaced: Any) -> Responses:
         """Return the response curve at any amplitude; fields of its study may be replaced."""
         return responses(self.evidence.study(self.case.study((model,), (amplitude_m,), **replaced)))
@@ -81,10 +76,10 @@ class Reading:
         return self.exponents_of(self.curve(amplitude_m, model, observe=WITH_EXPONENT), amplitude_m, model)
 
     def exponents_of(self, curve: Responses, amplitude_m: float, model: str = PIECE_WISE) -> Reals:
-        """Return the exponents by the case's method; for motions without collisions, the exact ones."""
+        """Return the exponents by the case's method, or the exact ones for motions without collisions."""
         if self.case.exponents_by is ExponentsBy.EXACT or np.isnan(curve.exponent_per_s).all():
             return curve.exponent_per_s
-        specimen, settle_s = self.specimen(model), self.case.window_s
+        specimen, settle_s = self.case.specimen(model), self.case.window_s
         kept_s = self.case.duration_s - settle_s
 
         def follow() -> Reals:

@@ -5,10 +5,17 @@ import numpy as np
 from vibench.analysis import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
 
 from .claim import NO_THIRD, at_most, claim, costly_claim, peaks_at
-from .figure_11_clearance import GAPS_M, studies as clearance_studies
-from .peaks import bound_peaks, linear_peaks, nearest, response_peaks, two_highest
 from .reading import STRONG_M, WEAK_M, Reading, Values
-from .responses import linear_transmissibility, responses
+from .response_figures import GAPS_M, clearance
+from .responses import (
+    bound_peaks,
+    linear_peaks,
+    linear_transmissibility,
+    nearest,
+    response_peaks,
+    responses,
+    two_highest,
+)
 
 _WHOLE_HZ = 1.0
 """Tolerance of resonances that the paper gives in whole hertz."""
@@ -22,7 +29,7 @@ _AT_GAPS = f"The two highest peaks for {len(GAPS_M)} gaps, 5 to 60 µm, with A0 
 @claim("3.1", "Peaks of the exact linear |x / U|, to 0.01 Hz.", *peaks_at(PAPER_RESONANCES_HZ, _WHOLE_HZ))
 def linear_resonances(r: Reading) -> Values:
     """Without collisions m0 resonates at 95, 266 and 500 Hz."""
-    found = linear_peaks(r.specimen(), r.case.frequencies_hz[0], r.case.highest_hz)
+    found = linear_peaks(r.case.specimen(), r.case.frequencies_hz[0], r.case.highest_hz)
     return nearest(found, PAPER_RESONANCES_HZ)
 
 
@@ -32,8 +39,8 @@ def linear_resonances(r: Reading) -> Values:
     *peaks_at(PAPER_TERMINAL_RESONANCES_HZ, _WHOLE_HZ),
 )
 def bound_resonances(r: Reading) -> Values:
-    """With m1 and m2 bound together two resonances remain, 201 and 435 Hz."""
-    found = bound_peaks(r.specimen(), r.case.frequencies_hz[0], r.case.highest_hz)
+    """With m1 and m2 bound together two resonances remain, at 201 and 435 Hz."""
+    found = bound_peaks(r.case.specimen(), r.case.frequencies_hz[0], r.case.highest_hz)
     return nearest(found, PAPER_TERMINAL_RESONANCES_HZ)
 
 
@@ -50,13 +57,13 @@ def weak_peaks(r: Reading) -> Values:
 
 @claim(
     "3.1, Fig. 3(a)",
-    "Largest distance of the three peaks near each resonance; at most one grid step is required.",
+    "Largest distance between the three peaks near each resonance; at most one grid step is required.",
     *(at_most(f"spread near {each:g} Hz", "Hz", _GRID_HZ) for each in PAPER_RESONANCES_HZ),
 )
 def weak_identical(r: Reading) -> Values:
     """At 1 µm Responses I, II and the linear response have identical resonance peaks."""
     curve = r.level(WEAK_M)
-    linear = linear_transmissibility(r.specimen(), curve.frequency_hz)
+    linear = linear_transmissibility(r.case.specimen(), curve.frequency_hz)
     found = [
         nearest(response_peaks(curve.frequency_hz, each), PAPER_RESONANCES_HZ)
         for each in (curve.response_i, curve.response_ii, linear)
@@ -66,7 +73,7 @@ def weak_identical(r: Reading) -> Values:
 
 @claim(
     "3.1, Fig. 3(a)",
-    "Largest difference of Response I from Response II over the grid.",
+    "Largest difference between Response I and Response II over the grid.",
     at_most("largest difference", "%", 0.02),
 )
 def weak_equal(r: Reading) -> Values:
@@ -94,7 +101,7 @@ def suppressed(r: Reading) -> Values:
     NO_THIRD,
 )
 def strong_two_i(r: Reading) -> Values:
-    """At 50 µm Response I has two resonances, 201 and 435 Hz."""
+    """At 50 µm Response I has two resonances at 201 and 435 Hz."""
     curve = r.level(STRONG_M)
     return two_highest(curve.frequency_hz, curve.response_i)
 
@@ -106,7 +113,7 @@ def strong_two_i(r: Reading) -> Values:
     NO_THIRD,
 )
 def strong_two_ii(r: Reading) -> Values:
-    """At 50 µm Response II has two resonances, 201 and 435 Hz."""
+    """At 50 µm Response II has two resonances at 201 and 435 Hz."""
     curve = r.level(STRONG_M)
     return two_highest(curve.frequency_hz, curve.response_ii)
 
@@ -136,9 +143,9 @@ def any_gap_ii(r: Reading) -> Values:
 
 
 def _worst_gap(r: Reading, what: str) -> Values:
-    """Return the largest deviation from the terminal resonances, and the largest ratio of peaks 3 and 2."""
+    """Return the largest deviation from the terminal resonances, and the largest ratio peak 3 / peak 2."""
     furthest, following = 0.0, 0.0
-    for study in clearance_studies(r.case):
+    for study in clearance.studies(r.case):
         curve = responses(r.evidence.study(study))
         *near, next_over_second = two_highest(curve.frequency_hz, getattr(curve, what))
         furthest = max(furthest, float(np.max(np.abs(np.array(near) - PAPER_TERMINAL_RESONANCES_HZ))))

@@ -1,20 +1,63 @@
-"""Response curves from a study, and functions to draw them."""
+"""Response curves from a study, and their peaks."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import find_peaks
 
-from vibench.analysis import report
-from vibench.sim import Specimen, base_transmissibility
+from vibench.sim import Specimen, base_transmissibility, bound_matrices
 from vibench.sim.study import StudyResults
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 Reals = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+
+LEAST_PROMINENCE = 2.0
+"""Smallest ratio of a peak to the minimum beside it; chaos scatters Response I by some per cent."""
+_FINE_POINTS = 60_000
+"""Number of frequencies, 0.01 Hz apart, at which peaks without contact are sought."""
+
+
+def response_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = LEAST_PROMINENCE) -> Reals:
+    """Return the frequencies of the peaks of a curve, ascending, shape (peaks,)."""
+    known = np.isfinite(response)
+    found, _ = find_peaks(np.log(response[known]), prominence=np.log(least_prominence))
+    return np.asarray(frequency_hz[known][found])
+
+
+def linear_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
+    """Return the peak frequencies of m0 over the base without contact, to 0.01 Hz, shape (peaks,)."""
+    fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
+    return response_peaks(fine, linear_transmissibility(specimen, fine))
+
+
+def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
+    """Return the peak frequencies of m0 over the base with m1 fixed to m2, to 0.01 Hz, shape (peaks,)."""
+    mass, damping, stiffness = bound_matrices(specimen)
+    fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
+    omega = 2.0 * np.pi * fine[:, None, None]
+    force = np.zeros((fine.size, 2, 1), dtype=np.complex128)
+    force[:, 0, 0] = specimen.stiffnesses[0] + 1j * omega[:, 0, 0] * specimen.dampings[0]
+    moved = np.linalg.solve(stiffness - omega**2 * mass + 1j * omega * damping, force)
+    return response_peaks(fine, np.abs(moved[:, 0, 0]))
+
+
+def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, float]:
+    """Return the two highest peaks in ascending order [Hz], and the ratio of peak heights third / second."""
+    found = np.flatnonzero(np.isin(frequency_hz, response_peaks(frequency_hz, response)))
+    if found.size < 2:
+        return np.nan, np.nan, np.nan
+    ranked = found[np.argsort(-response[found])]
+    first, second = np.sort(frequency_hz[ranked[:2]])
+    following = response[ranked[2]] / response[ranked[1]] if found.size > 2 else 0.0
+    return float(first), float(second), float(following)
+
+
+def nearest(found: Reals, wanted_hz: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the peak nearest to each frequency; NaN if there is no peak."""
+    if found.size == 0:
+        return tuple(np.nan for _ in wanted_hz)
+    return tuple(float(found[np.argmin(np.abs(found - wanted))]) for wanted in wanted_hz)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +73,17 @@ class Responses:
     collides: Flags
     """Whether m1 and m2 collided within the window."""
 
+    def collides_within(self, low_hz: float, high_hz: float) -> Flags:
+        """Return whether m1 and m2 collided, for frequencies between two limits; shape (points,)."""
+        return np.asarray(self.collides & (self.frequency_hz > low_hz) & (self.frequency_hz < high_hz))
+
     def columns(self, *names: str) -> dict[str, Reals]:
         """Return columns of a table: the frequencies and these quantities; flags become 0 and 1."""
         return {name: getattr(self, name) + 0 for name in ("frequency_hz", *names)}
 
 
 def responses(results: StudyResults, **fixed: float | str) -> Responses:
-    """Return one curve of a study; each axis except frequency must be fixed or have one value."""
+    """Return one curve of a study; each axis except frequency must be given or have only one value."""
     only = {axis.name: axis.values[0] for axis in results.axes if len(axis.values) == 1}
     at = {name: value for name, value in {**only, **fixed}.items() if name != "frequency"}
     return Responses(
@@ -52,39 +99,3 @@ def responses(results: StudyResults, **fixed: float | str) -> Responses:
 def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
     """Return |x / U| of the specimen without contact, shape (frequencies,)."""
     return np.abs(base_transmissibility(specimen, frequency_hz)[:, 0])
-
-
-def stretches(flags: Flags) -> NDArray[np.intp]:
-    """Return the first index of each run of true flags, and the first index after it, shape (runs, 2)."""
-    changes = np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))
-    return np.flatnonzero(changes).reshape(-1, 2)
-
-
-def shade(axes: "Axes", frequency_hz: Reals, flags: Flags, label: str) -> None:
-    """Shade each flagged frequency, as far as the midpoints between it and its neighbours."""
-    between = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
-    edges = np.concatenate(([frequency_hz[0]], between, [frequency_hz[-1]]))
-    for first, end in stretches(flags):
-        axes.axvspan(edges[first], edges[end], color=report.COLLIDING, zorder=0, linewidth=0, label=label)
-
-
-def draw_linear(axes: "Axes", frequency_hz: Reals, specimen: Specimen) -> None:
-    """Draw the response without contact, on a grid fine enough for its peaks."""
-    fine = np.linspace(frequency_hz[0], frequency_hz[-1], 4 * frequency_hz.size)
-    linear = linear_transmissibility(specimen, fine)
-    axes.plot(fine, linear, color=report.LINEAR, linestyle="--", linewidth=1.0, label="without contact")
-
-
-def draw_responses(axes: "Axes", curve: Responses) -> None:
-    """Draw Responses I and II."""
-    f = curve.frequency_hz
-    axes.plot(f, curve.response_i, color=report.MEASURED, label="Response I")
-    axes.plot(f, curve.response_ii, color=report.SIMULATED, linestyle="-.", label="Response II")
-    finish(axes, f, "response of m0 over A0")
-
-
-def finish(axes: "Axes", frequency_hz: Reals, label: str) -> None:
-    """Set the axes of a response panel; in a grid of panels, `label_outer` then removes the inner labels."""
-    report.frequency_axis(axes, float(max(frequency_hz[0], 10.0)), float(frequency_hz[-1]))
-    report.magnitude_axis(axes)
-    axes.set(ylabel=label, xlabel="drive frequency [Hz]")

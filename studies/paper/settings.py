@@ -8,9 +8,9 @@ import numpy as np
 from vibench.analysis import report
 from vibench.sim import gong2025
 
-from .case import ALIKE, BY_ODE45, CLOSEST, SCORED_S, Case, damping, together
 from .claim import Claim, finding
 from .exponent_claims import NEAR_ZERO_PER_S, SEVERE_PER_S
+from .options import ALIKE, BY_ODE45, CLOSEST, SCORED_S, Case, damping, together
 from .reading import MODERATE_M, WEAK_M, Evidence, Reading
 
 SETTINGS = (damping(1e-5), damping(4e-5), ALIKE, BY_ODE45, together(damping(4e-5), BY_ODE45))
@@ -38,7 +38,7 @@ def holds_from_rest(claim: Claim, evidence: Evidence, case: Case) -> bool:
 
 
 def scores(claims: Sequence[Claim], evidence: Evidence, case: Case) -> tuple[DampingScore, ...]:
-    """Measure every scored claim at every damping; all other options are those of the case."""
+    """Measure every scored claim at every damping; the case gives all other options."""
     found = []
     for damping_time_s in SCORED_S:
         at = damping(damping_time_s).of(case)
@@ -115,7 +115,7 @@ def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -
     settings = [case, *(each.of(case) for each in SETTINGS), CLOSEST.of(case)]
     rows = []
     for claim in claims:
-        # Claims on continuous models take too long for the intermediate settings.
+        # For claims on continuous models, the intermediate settings would take too long.
         claim_settings = settings if claim.is_scored else [settings[0], settings[-1]]
         held = {
             each.name: "holds" if holds_from_rest(claim, evidence, each) else "fails"

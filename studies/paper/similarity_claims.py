@@ -4,15 +4,14 @@ from functools import partial
 
 import numpy as np
 
-from vibench.analysis import LogarithmOf, SimilarityCurve, similarity
+from vibench.analysis import LogarithmOf
 from vibench.sim import spring_of
 
-from .case import CLOSEST, COMPARED_LOWER, DAMPINGS, NARROWER_FIT, SEVENTH_COUNTS, Case, change
 from .claim import Expectation, about, at_least, at_most, claim, costly_claim
-from .figure_09_extreme import MODELS as EXTREME_ORDERS
-from .options import AMPLITUDES_M
+from .options import AMPLITUDES_M, CLOSEST, COMPARED_LOWER, DAMPINGS, NARROWER_FIT, SEVENTH_COUNTS, change
 from .reading import PIECE_WISE, Reading, Values
 from .responses import Reals
+from .similarity_figures import EXTREME_ORDERS, similarity_of
 
 CUBIC, FIFTH, SEVENTH = "power:3", "power:5", "power:7"
 FIRST, SECOND = "response_i", "response_ii"
@@ -36,23 +35,19 @@ _fitted_claim = partial(costly_claim, tried=FITTED, draws=_DRAWS)
 """Decorator for a claim on the rates of several models."""
 
 
-def orders(case: Case) -> tuple[str, ...]:
+def orders(r: Reading) -> tuple[str, ...]:
     """Return the models of Fig. 8."""
-    return (CUBIC, FIFTH, SEVENTH, case.sum_model)
+    return (CUBIC, FIFTH, SEVENTH, r.case.sum_model)
 
 
 def rates(r: Reading, model: str, what: str) -> Reals:
     """Return the similarity rates of a continuous model (eq. 7) at 1, 5, 10 and 50 um."""
-    found = []
-    for amplitude_m in AMPLITUDES_M:
-        curves = []
-        for each in (PIECE_WISE, model):
-            curve = r.level(amplitude_m, each)
-            within = curve.frequency_hz <= r.case.similarity_highest_hz
-            response = getattr(curve, what)[within]
-            curves.append(SimilarityCurve(curve.frequency_hz[within], response, amplitude_m))
-        found.append(similarity(curves[0], curves[1], r.case.logarithm_of, r.case.threshold).rate)
-    return np.array(found)
+    return np.array(
+        [
+            similarity_of(r.case, (r.level(a, each) for each in (PIECE_WISE, model)), a, what).rate
+            for a in AMPLITUDES_M
+        ]
+    )
 
 
 @claim(
@@ -66,7 +61,7 @@ def fits(r: Reading) -> Values:
     """With larger n the fitted force is closer to Hertz's; the force of 3+5+7 is between n = 5 and 7."""
     p = np.linspace(0.5 * r.case.gap_m, r.case.gap_m, _CURVE_POINTS)
     cubic, fifth, seventh, total = (
-        spring_of(r.specimen(model)).force(p, np.zeros_like(p)) for model in orders(r.case)
+        spring_of(r.case.specimen(model)).force(p, np.zeros_like(p)) for model in orders(r)
     )
     between = (total >= seventh) & (total <= fifth)
     nearer = (seventh <= fifth) & (fifth <= cubic)
@@ -196,7 +191,7 @@ def extreme_orders_cost(r: Reading) -> Values:
 
 
 def _all_rates(r: Reading, what: str) -> list[Reals]:
-    return [rates(r, model, what) for model in orders(r.case)]
+    return [rates(r, model, what) for model in orders(r)]
 
 
 def _seventh_above(r: Reading, model: str) -> Values:

@@ -6,17 +6,17 @@ from vibench.analysis import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ a
 from vibench.sim import Harmonic
 
 from .claim import about, at_least, at_most, claim
+from .motion_figures import TimeSignal, time_signal
 from .options import AMPLITUDES_M
 from .reading import MODERATE_M, STRONG_M, WEAK_M, Reading, Values
 from .responses import Reals
-from .time_signal import TimeSignal, time_signal
 
 SHOWN_HZ = 260.0
 _HALF_BAND_HZ = 10.0
 _LOOKED_HZ = ((150.0, 245.0), (350.0, 500.0))
 """Search ranges of the two broad peaks: around each terminal resonance, but away from the drive."""
 _ABSENT, _PRESENT = 0.01, 0.1
-"""Largest level of an absent line and smallest level of a present line, relative to the drive's line."""
+"""Level up to which a line counts as absent, and from which it counts as present, relative to the drive."""
 _NEAR_HZ = 20.0
 """Tolerance of the broad peaks, small enough to exclude the linear resonances."""
 _STEPS = ("5 over 1 µm", "10 over 5 µm", "50 over 10 µm")
@@ -85,9 +85,9 @@ def chaos_escalates(r: Reading) -> Values:
 
 
 def _signal(r: Reading, amplitude_m: float) -> TimeSignal:
-    key = ("signal", amplitude_m, r.specimen(), r.case.accuracy)
+    key = ("signal", amplitude_m, r.case.specimen(), r.case.accuracy)
     return r.evidence.compute_once(
-        key, lambda: time_signal(r.specimen(), Harmonic(SHOWN_HZ, amplitude_m), r.case)
+        key, lambda: time_signal(r.case.specimen(), Harmonic(SHOWN_HZ, amplitude_m), r.case)
     )
 
 

@@ -26,7 +26,7 @@ READING_S = 1e-3
 LOST_M = 1.0
 """Displacement beyond which a motion has diverged [m]."""
 SLOWEST_PER_S = 1e-9
-"""Smallest relative rate of change for the first step, needed for a state at rest [1/s]."""
+"""Smallest relative rate of change assumed for the first step, needed for a state at rest [1/s]."""
 
 
 def numbers_of(specimen: Specimen, drive: Harmonic) -> Reals:
@@ -45,7 +45,7 @@ def rates(time_s: float | Reals, state: Reals, spring: RestoringForce, numbers: 
     angle = omega * time_s + phase
     base, base_rate = amplitude * np.sin(angle), amplitude * omega * np.cos(angle)
     p, rate = y - z, vy - vz
-    # A trial step of an implicit method may overflow.
+    # Trial steps of an implicit method may overflow.
     with np.errstate(over="ignore", invalid="ignore"):
         inner = k1 * p + c1 * rate + spring.force(p, rate)
         outer = k2 * (z - x) + c2 * (vz - vx)
@@ -103,7 +103,7 @@ def textbook_exponents(
     duration_s: float = 25.0,
     settle_s: float = 5.0,
 ) -> Reals:
-    """Return the largest Lyapunov exponents of a method for motions from rest [1/s]; NaN after divergence.
+    """Return the largest Lyapunov exponents for motions from rest, by one method [1/s]; NaN if divergent.
 
     An exponent is the mean divergence rate, over ``duration_s`` after ``settle_s``, of a neighbour that takes
     the same steps. The resolution for regular motions is about 1 / ``duration_s``. Shape (n,), one per drive;
@@ -126,10 +126,10 @@ def _largest(change: Reals, one: Reals, other: Reals, floor: float) -> Reals:
 
 
 def _next_steps(step_s: Reals, error: Reals, failures: Reals, method: TextbookMethod) -> Reals:
-    """Return the next step lengths as `ode45` does; ``failures`` is the number of consecutive failures."""
+    """Return the next step lengths as `ode45` does; ``failures`` counts consecutive failed steps."""
     if method.relative == math.inf:
         return np.full_like(step_s, method.longest_s)
-    # Without error, the step grows by the largest factor; after a non-finite error it is a tenth.
+    # If the error is 0, the step grows by the largest factor; if not finite, it falls to a tenth.
     part = 1.25 * (error / method.relative) ** 0.2
     shorter = np.where(failures > 0, 0.5, np.fmax(0.1, 1.0 / np.maximum(part, 0.2)))
     longer = np.where(failures > 0, step_s, np.minimum(method.longest_s, step_s / np.maximum(part, 0.2)))

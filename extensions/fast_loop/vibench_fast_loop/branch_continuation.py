@@ -5,8 +5,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.acquisition.excitation.feedback import BaseLevel, Share
-from vibench.acquisition.excitation.plan import AbstractFeedback, Family, FrequencyHz
+from vibench.acquisition.excitation.plan import AbstractFeedback, BaseLevel, Family, FrequencyHz, Share
 from vibench.acquisition.excitation.steps import LoopTone, Segment, Step
 from vibench.acquisition.recording import SegmentLabel
 from vibench.acquisition.rig import Rig

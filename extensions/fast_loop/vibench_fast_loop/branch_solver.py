@@ -16,7 +16,7 @@ _DOUBTED = 0.05
 _REFERENCE_STEP = 0.15
 """Relative change of the first coefficient that counts as one step along the branch."""
 _RATIO_STEP = 1.0
-"""Change of the ratio m0 / base that counts as one step."""
+"""Change of the ratio m0 / base that counts as one step along the branch."""
 _RATIO = 2
 """Number of rows for the ratio m0 / base (real and imaginary part), after the rows of the residual."""
 _NEW = 0.3
@@ -50,7 +50,7 @@ class MeasuredPoint:
 
     @property
     def place(self) -> Vector:
-        """Coordinates for the arc length: frequency and both parts of the ratio, each in steps."""
+        """Coordinates for the arc length [steps]: frequency, and real and imaginary part of the ratio."""
         return np.array([self.unknowns[0], self.ratio.real / _RATIO_STEP, self.ratio.imag / _RATIO_STEP])
 
 
@@ -132,7 +132,7 @@ class BranchSolver:
         )
 
     def learn(self, point: MeasuredPoint) -> None:
-        """Update the derivative from the difference between the last measurement and this one."""
+        """Update the derivative from the difference between the last measurement and this measurement."""
         if self._last is not None:
             moved = point.unknowns - self._last.unknowns
             changed = _outputs(point) - _outputs(self._last)

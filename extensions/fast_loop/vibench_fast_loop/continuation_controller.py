@@ -3,14 +3,15 @@
 Small perturbations of the drive show whether the motion would be stable without feedback.
 """
 
-from dataclasses import replace
+from collections.abc import Generator
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import degrees, isfinite, nan
+from math import degrees, isfinite, nan, pi
 
 import numpy as np
 
-from vibench.acquisition.control.control_action import Controller, PhaseSamples
-from vibench.acquisition.control.feedback_channels import FeedbackChannels
+from vibench.acquisition.control.control_action import ControlAction, Controller, PhaseSamples
+from vibench.acquisition.control.feedback_channels import FeedbackChannels, require_answer
 from vibench.acquisition.control.sine_loop import SineLoop
 from vibench.acquisition.excitation.steps import Segment
 from vibench.acquisition.instruments import Samples
@@ -24,7 +25,6 @@ from vibench.acquisition.recording import (
 )
 
 from .branch_continuation import BranchContinuation
-from .branch_player import BranchPlayer, LoopLook
 from .branch_solver import (
     BranchSolver,
     Coefficients,
@@ -43,6 +43,139 @@ from .open_loop_multiplier import (
     envelope_deviation,
     open_loop_multiplier,
 )
+from .protocol import LoopBlock, LoopProgram, ProgramTone
+
+_BLOCK_PERIODS = 10
+_GLIDE_S = 0.1
+_HIGHEST = 9
+_MOST_LOOKS = 20
+_KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
+"""Largest standard errors at the end of a measurement: for fundamental and harmonics of the base, relative
+to the tolerance; for m0, relative to m0's amplitude."""
+_ROUGHLY = 0.15
+"""Largest standard error of the base motion while far from the level, relative to the distance from it."""
+_DRIFT = 3.0
+"""Largest difference between the two halves of the settled blocks, in standard errors."""
+_REMEMBERED = 0.8
+"""Weight of the scatter in earlier measurements; a few blocks of one measurement may agree by chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopLook:
+    """Response of base and m0 to a setting: mean harmonics over blocks, starting with the first harmonic."""
+
+    base_m: Coefficients
+    m0_m: Coefficients
+    base_u: Vector
+    """Standard error of real and imaginary part of each coefficient [m]."""
+    m0_u: Vector
+
+    @property
+    def ratio(self) -> complex:
+        """Ratio of the fundamentals of m0 and base."""
+        return complex(self.m0_m[0] / self.base_m[0])
+
+    @property
+    def ratio_u(self) -> float:
+        """Standard error of the real and of the imaginary part of `ratio`."""
+        shares = self.m0_u[0] / abs(self.m0_m[0]), self.base_u[0] / abs(self.base_m[0])
+        return float(abs(self.ratio) * np.hypot(*shares))
+
+
+class BranchPlayer:
+    """Player of controller settings, which measures the response of base and m0 to each setting."""
+
+    def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
+        self.plan = plan
+        self.fast = fast
+        self.run = loop.run_phase
+        self._most_vpp = loop.most_vpp
+        self._feedback = fast.feedback
+        self._blocks: list[LoopBlock] = []
+        """Blocks of coefficients measured at the current setting since the motion settled."""
+        self._squares, self._degrees = np.zeros(1), 0.0
+        """Sum of squared deviations of blocks in earlier measurements, and the sum's degrees of freedom."""
+
+    def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
+        """Convert a setting to a program of the controller."""
+        program = LoopProgram(
+            frequency_hz=setting.frequency_hz,
+            reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
+            feedback=self._feedback,
+            glide_s=glide_s,
+            block_periods=_BLOCK_PERIODS,
+            harmonics=max(_HIGHEST, self.plan.harmonics),
+        )
+        level = 2 * abs(setting.reference_v[0]) / self._most_vpp
+        return ProgramTone(setting.frequency_hz, min(float(level), 1.0), program)
+
+    def measure(
+        self, setting: LoopSetting, level_m: float
+    ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
+        """Play a setting, and average until the standard errors are small enough; return the response."""
+        tone, frequency_hz = self.tone(setting), setting.frequency_hz
+        look_s = self.plan.look_periods / frequency_hz
+        samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
+        self._blocks = list(samples.coefficients)[-max(2, self.plan.look_periods // _BLOCK_PERIODS) :]
+        look, squares, degrees = self._average(frequency_hz)
+        for _ in range(_MOST_LOOKS - 1):
+            if _is_known(look, level_m, self.plan):
+                break
+            samples = yield from self.run(Phase(RunState.SETTLING, tone, look_s))
+            self._blocks += samples.coefficients
+            look, squares, degrees = self._average(frequency_hz)
+        self._squares = _REMEMBERED * (self._squares + squares)
+        self._degrees = _REMEMBERED * (self._degrees + degrees)
+        acceleration = abs(look.base_m[0]) * (2 * pi * frequency_hz) ** 2
+        require_answer(self.fast.rig, frequency_hz, 2 * abs(setting.reference_v[0]) * 0.1, acceleration)
+        return look
+
+    def record(
+        self, setting: LoopSetting, segment: Segment
+    ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
+        """Record the current setting; return the average over the recording and the preceding measurement."""
+        tone = self.tone(setting)
+        samples = yield from self.run(Phase(RunState.RECORDING, tone, self.plan.record_s, segment))
+        self._blocks += samples.coefficients
+        return self._average(setting.frequency_hz)[0]
+
+    def _average(self, frequency_hz: float) -> tuple[LoopLook, Vector, int]:
+        base, m0 = self.fast.motions(self._blocks, frequency_hz)
+        seen = _settled_part(np.hstack([base, m0]))
+        mean, degrees = seen.mean(axis=0), len(seen) - 1
+        squares = 0.5 * np.sum(np.abs(seen - mean) ** 2, axis=0)
+        known = max(self._degrees + degrees, 1.0)
+        error = np.sqrt((self._squares + squares) / known / len(seen))
+        orders = base.shape[1]
+        look = LoopLook(mean[:orders], mean[orders:], error[:orders], error[orders:])
+        return look, squares, degrees
+
+
+def _settled_part(seen: Coefficients) -> Coefficients:
+    """Return the blocks without their first half; repeat this while the two halves of the rest differ."""
+    while len(seen) > 3:
+        first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
+        # Take the scatter from differences of neighbours, because a drift hardly changes these differences.
+        scatter = np.sqrt(0.5 * np.mean(np.abs(np.diff(seen, axis=0)) ** 2, axis=0))
+        moved = np.abs(first.mean(axis=0) - second.mean(axis=0))
+        error = scatter * np.sqrt(1 / len(first) + 1 / len(second))
+        fundamentals = [0, seen.shape[1] // 2]
+        if np.all((moved <= _DRIFT * error)[fundamentals]):
+            break
+        seen = second
+    return seen
+
+
+def _is_known(look: LoopLook, level_m: float, plan: BranchContinuation) -> bool:
+    """Return whether the standard errors are small enough for the base's present distance from the level."""
+    share = look.base_u[: plan.harmonics] / level_m
+    wrong = abs(abs(look.base_m[0]) / level_m - 1)
+    return bool(
+        share[0] <= max(_KNOWN * plan.tolerance, _ROUGHLY * wrong)
+        and share[1:].max() <= max(_KNOWN_HARMONIC * plan.tolerance, _ROUGHLY * wrong)
+        and look.m0_u[0] <= _KNOWN_RATIO * abs(look.m0_m[0])
+    )
+
 
 _MOST_TRIES = 8
 _FIRST_TRIES = 30
@@ -52,7 +185,7 @@ _NEAR = 0.3
 _SHORTEST_STEP = 1 / 64
 """Shortest step, as a fraction of the step in the plan."""
 _GROWTH, _EASY = 1.5, 3
-"""Factor by which steps grow after an easy point, and largest number of attempts at an easy point."""
+"""Factor by which steps grow after an easy point; a point is easy up to this number of attempts."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 """Variations of the unknowns: frequency and first coefficient in steps, harmonics relative to the level."""
 _BELOW = 5.0
@@ -60,8 +193,8 @@ _BELOW = 5.0
 _ABOVE = 8.0
 """Distance of the initial value above the model's (about threefold) in an approach from above, in steps."""
 _LOWERED, _CALM = 0.3, 0.03
-"""Largest decrease of the first coefficient per try [steps], allowed only while the base harmonics are at
-most this fraction of the level. Both limits are small, because a motion with impacts is easily lost."""
+"""Largest decrease of the first coefficient per try [steps]; largest base harmonics, relative to the level,
+at which it is allowed. Both limits are small, because a motion with impacts is easily lost."""
 _SLOPES = 0.05, 1.0
 """Bounds on the slope, the change of the base level per step of the first coefficient, at the start."""
 _LEAST_CHANGE = 0.01
@@ -144,13 +277,13 @@ def _first_motion(player: BranchPlayer, solver: BranchSolver) -> Controller[tupl
             slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
         harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
         before, unknowns = seen, solver.correct(harmonics, predicted)
-        # Use a secant, not a bracket: nonzero harmonics also change the level, so a bracket becomes invalid.
+        # Use a secant: nonzero harmonics also change the level, which makes a bracket invalid.
         unknowns[1] = seen.unknowns[1]
         if not above or np.abs(seen.residual[1:]).max() <= _CALM:
             unknowns[1] -= min(max(wrong / slope, -most), most)
     if abs(wrong) > _NEAR:
         return None
-    # Level and harmonics interact; changing all unknowns together would converge slowly.
+    # Level and harmonics interact, so changing all unknowns together would converge slowly.
     yield from _probe(player, solver, seen, len(seen.unknowns))
     return (yield from _correct(player, solver, replace(predicted, unknowns=seen.unknowns)))
 
@@ -159,7 +292,7 @@ def _probe(player: BranchPlayer, solver: BranchSolver, last: MeasuredPoint, colu
     """Return to the last point, and update the derivative by varying the first unknowns one by one.
 
     The derivatives with respect to frequency and first coefficient change most. Derivatives with respect to
-    the harmonics are estimated from joint changes; near a fold, they can make the equations unsolvable.
+    the harmonics are estimated from joint changes; near a fold, these can make the equations singular.
     """
     here = yield from _look_at(player, solver, last.unknowns)
     for column in range(columns):
@@ -226,7 +359,7 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
 
 
 _EACH = 5
-"""Number of drive periods per change: deviations hardly grow in this time, but the upper modes can follow."""
+"""Number of drive periods per change: too few for deviations to grow, enough for upper modes to follow."""
 _LEAD, _TRIAL = 3, 8
 """Number of changes before the evaluated changes; number of changes in the trial that finds the size."""
 _CHANGED = (0, 2)
@@ -248,7 +381,7 @@ def perturbed_stability(
     plan, frequency_hz = player.plan, setting.frequency_hz
     period = channels.sample_rate_hz / frequency_hz
     count = plan.perturbed_periods // (2 * _EACH)
-    # Changes of magnitude 1 with random signs of both parts, shape (count, coefficients).
+    # Changes of magnitude 1, with random signs of real and imaginary part, shape (count, coefficients).
     corners = np.random.default_rng(number).integers(0, 4, (count, len(_CHANGED)))
     changes = np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
     first_v = _FIRST_SIZE * abs(setting.reference_v[0])
@@ -265,7 +398,7 @@ def perturbed_stability(
 def _play_changes(
     player: BranchPlayer, setting: LoopSetting, course: Coefficients, segment: Segment | None
 ) -> Controller[list[PhaseSamples]]:
-    """Play changes one after another, connected along half cosines; return the samples of each."""
+    """Play changes one after another, connected along half cosines; return the samples of each change."""
     phases = []
     state = RunState.SETTLING if segment is None else RunState.RECORDING
     length_s = _EACH / setting.frequency_hz
@@ -285,7 +418,7 @@ def _join(phases: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Sampl
 def _fit(
     phases: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
 ) -> OpenLoopMultiplier:
-    """Return the fitted multiplier; NaN if samples between phases are missing, because the run was held."""
+    """Return the fitted multiplier; NaN if the run was held, so that samples between phases are missing."""
     if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(phases)):
         return OpenLoopMultiplier(nan, nan)
     base, m0 = _join(phases, channels)
@@ -303,7 +436,7 @@ def stability_note(
     low, high = found.bounds
     stability = Stability.OPEN
     if moved <= max(_SAME, _ERRORS * error):
-        # Comparisons with NaN are false, so the stability is then undetermined.
+        # If a bound is NaN, both comparisons are false, and the stability is undetermined.
         stability = Stability.STABLE if high < 1 else Stability.UNSTABLE if low > 1 else Stability.OPEN
     known = isfinite(found.size) and isfinite(found.error)
     return BranchStabilityNote(

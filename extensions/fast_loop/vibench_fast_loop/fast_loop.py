@@ -26,16 +26,15 @@ from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.harmonic_balance import BalanceEnd, structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.periodic.shooting import PeriodMap
-from vibench.sim.specimen.state import VY, VZ, Floats, Y, Z
+from vibench.sim.specimen.specimen import VY, VZ, Floats, Y, Z
 
 from .branch_continuation import BranchContinuation
-from .law import LinearLaw, design_law, loop_multiplier, loop_transfer, pd_law
-from .plant import LoopTiming, SampledPlant
+from .law import LinearLaw, LoopTiming, SampledPlant, design_law, loop_multiplier, loop_transfer, pd_law
 from .protocol import LoopBlock, LoopFeedback
 
 Coefficients = NDArray[np.complex128]
 LARGEST_MULTIPLIER = 0.99
-"""Largest Floquet multiplier allowed along a branch; with it, deviations fall to a third in 100 periods."""
+"""Largest Floquet multiplier allowed along a branch; deviations then fall to a third in 100 periods."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +127,7 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
         raise LimitExceeded(
             f"the fast loop would not hold the branch: the modelled loop's largest multiplier is "
             f"{hold.multiplier:.3g} at {hold.at_hz:.5g} Hz with {1e3 * timing.latency_s:.3g} ms of latency "
-            f"at {timing.rate_hz:g} samples a second; at most {LARGEST_MULTIPLIER:g} is allowed. It would "
+            f"at {timing.rate_hz:g} samples/s; at most {LARGEST_MULTIPLIER:g} is allowed. The loop would "
             f"hold {held}. Nothing was played; narrow the range, shorten the latency, or lower the level"
         )
     if hold.end not in (ArcEnd.REACHED_BOUND, ArcEnd.CLOSED):
@@ -163,18 +162,18 @@ Begin = Literal["rest", "above"]
 _POINTS = 25
 """Number of motions checked along a branch, including stable ones, which a delayed law may destabilise."""
 _PERIODS, _WHOLE = range(1, 41), 2e-5
-"""Numbers of periods among which one with a whole number of samples is sought; tolerance for "whole"."""
+"""Numbers of periods, of which one with a whole number of samples is sought; tolerance for "whole"."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
-"""Number of points per period at which the spring force's slope is computed, without and with stops."""
+"""Number of points per period at which the slope of the spring force is computed: without and with stops."""
 _PART_S = 1e-6
-"""Longest part of a step in which the slope of the stops' force is held constant [s]; 1 % of a contact."""
+"""Longest part of a step with a constant slope of the stops' force [s]; 1 % of a contact's duration."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Decreasing levels, relative to the required level, through which a motion with impacts is reached."""
 
 
 @dataclass(frozen=True)
 class BranchHold:
-    """Part of a branch on which a law holds the motions, and the largest multiplier."""
+    """Part of a branch in which a law holds the motions, and the largest multiplier that was found."""
 
     multiplier: float
     """Largest multiplier over a period under the law, among the motions that were checked."""
@@ -250,7 +249,7 @@ def impact_branch(
 def _last_held(
     plant: SampledPlant, law: LinearLaw, branch: Branch, points: Points, held: Floats, allowed: float
 ) -> int | None:
-    """Return the last motion up to which all motions are held; None if the first motion is not held."""
+    """Return the last motion of the range in which all are held; None if the first motion is not held."""
     first = int(np.argmax(held > allowed))
     if held[first] <= allowed:
         return int(points[-1])

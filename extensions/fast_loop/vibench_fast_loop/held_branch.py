@@ -89,7 +89,7 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
     held = (
         f"{found.frequency_hz.size} motions were held. The base moved by {size_um.min():.4g} to "
         f"{size_um.max():.4g} µm; its harmonics were at most {found.residue.max():.2g} of the fundamental "
-        f"(in acceleration {found.residue_acceleration.max():.2g})."
+        f"({found.residue_acceleration.max():.2g} in acceleration)."
     )
     sentences = [held]
     if found.folds:
@@ -136,7 +136,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
 
 
 def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
-    """Return label, points and plot style by stability if it was measured, else by branch direction."""
+    """Return label, points and plot style: by stability if it was measured, else by branch direction."""
     filled: dict[str, Any] = {"marker": "o"}
     empty = filled | {"markerfacecolor": "white"}
     if any(found.stability):
@@ -166,7 +166,7 @@ def _model(axes: Axes, model: Branch, scale: float) -> None:
     m0 = scale * model.response_ii[:, 0] * model.amplitudes_m
     for chosen, style, label in (
         (model.is_stable, "-", "model, stable"),
-        (~model.is_stable, "--", "model, unstable"),
+        (~model.is_stable, "--", "model, not stable"),
     ):
         if chosen.any():
             near = chosen | np.roll(chosen, 1)

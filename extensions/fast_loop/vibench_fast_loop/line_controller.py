@@ -47,10 +47,10 @@ class LineController:
         if different or facts.watchdog_s > config.watchdog_s * (1 + _PART):
             controller.close()
             raise ConfigurationError(
-                f"{facts.name} at {config.resource} has {facts.rate_hz:g} samples a second, up to "
+                f"{facts.name} at {config.resource} has a rate of {facts.rate_hz:g} Hz, a limit of "
                 f"{facts.limit_v:g} V, a watchdog time of {facts.watchdog_s:g} s and {_laws(facts)}; the "
-                f"configuration has {config.rate_hz:g}, {config.limit_v:g} V, {config.watchdog_s:g} s and "
-                f"{_laws(config)}. The controller is silent; correct the configuration or the controller"
+                f"configuration has {config.rate_hz:g} Hz, {config.limit_v:g} V, {config.watchdog_s:g} s and "
+                f"{_laws(config)}. The controller's output is off; make the two agree"
             )
         return controller
 
@@ -86,24 +86,24 @@ class LineController:
         if not self._is_open:
             raise InstrumentError(
                 f"the connection to the real-time controller at {where} was closed during the request "
-                f"{request.ask}. The controller is silent; open the bench again"
+                f"{request.ask}. The controller's output is off; open the bench again"
             )
         try:
             self._link.write(request.model_dump_json(exclude_defaults=False))
             line = self._link.read_bytes(_LONGEST_LINE, break_on_termchar=True)
         except MemoryError:  # the caller releases its memory reserve
             raise
-        except Exception as error:  # pyvisa-py passes on whatever sockets raise
+        except Exception as error:  # pyvisa-py does not catch socket errors
             raise InstrumentLost(
-                f"the real-time controller at {where} does not answer ({error}). Its watchdog silences it "
-                f"after {self._config.watchdog_s:g} s; check its power and its network"
+                f"the real-time controller at {where} does not answer ({error}). Its watchdog silences its "
+                f"output after {self._config.watchdog_s:g} s; check its power and its network"
             ) from error
         try:
             answer = json.loads(line)
             if isinstance(answer, dict) and "refused" in answer:
                 raise InstrumentError(f"the real-time controller at {where} refused: {answer['refused']}")
             return kind.model_validate_json(line)
-        except (ValueError, RecursionError) as error:  # pydantic's validation error is a ValueError
+        except (ValueError, RecursionError) as error:  # ValueError includes pydantic's errors
             raise InstrumentError(
                 f"the program at {where} does not speak loop protocol {request.vibench_loop} "
                 f"({error}); correct controller.resource, or name its driver in controller.driver"

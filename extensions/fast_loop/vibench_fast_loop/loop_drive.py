@@ -100,7 +100,7 @@ class LoopDrive:
         if next_program != self._program:
             # Set the program before the command, so that a failed command counts as playing.
             self._program = next_program
-            self._controller.play(next_program)  # this discards the blocks of the previous program
+            self._controller.play(next_program)  # also discards the previous program's blocks
 
     def _split_duration(self, duration_s: float) -> Iterator[float]:
         longest_s = TALK * self._controller.facts.watchdog_s

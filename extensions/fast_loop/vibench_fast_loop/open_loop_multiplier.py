@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from vibench.sim.specimen.state import Table, Vector
+from vibench.sim.specimen.specimen import Floats
 
 Complexes = NDArray[np.complex128]
 _HALF = 4
@@ -51,14 +51,14 @@ _QUANTILE = 2.1
 class PerturbedMotion:
     """Samples of base and m0 during small changes of the drive."""
 
-    base: Vector
+    base: Floats
     """Base acceleration in any unit, shape (samples,)."""
-    m0: Vector
+    m0: Floats
     """Velocity of m0 in any unit, shape (samples,)."""
     period: float
     """Period of the drive [samples]."""
     first: int
-    """Index of the first sample with evaluated changes; the lead-in before it plays the last changes."""
+    """Index of the first sample with evaluated changes; the lead-in before plays the last of the changes."""
     periods: int
     """Number of periods with changes; the same changes with opposite sign follow."""
 
@@ -92,9 +92,9 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
         known += [_envelope(motion.base, wave, motion.period, order)[at] for order in range(top + 1)]
     left = _parts(known)
     right = _parts([_envelope(motion.m0, turn, motion.period, 1)[at]])
-    signs: Table = np.repeat([1.0, -1.0], rows // 2)[:, None]
+    signs: Floats = np.repeat([1.0, -1.0], rows // 2)[:, None]
     left, right = (signs * _detrend(each) for each in (left, right))
-    scale: Vector = np.maximum(left.std(axis=0), np.finfo(np.float64).tiny)
+    scale: Floats = np.maximum(left.std(axis=0), np.finfo(np.float64).tiny)
     left /= scale
     other = np.roll(left, rows // 2, axis=0)
     gains = np.asarray(np.linalg.lstsq(other.T @ left, other.T, rcond=None)[0], dtype=np.float64)
@@ -102,7 +102,7 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
     return _largest(found, gains, left, right, scale)
 
 
-def envelope_deviation(signal: Vector, period: float) -> float:
+def envelope_deviation(signal: Floats, period: float) -> float:
     """Return the relative rms deviation of a signal's fundamental from its mean and drift.
 
     ``signal`` spans about twenty drive periods or more, shape (samples,); ``period`` is one period [samples].
@@ -114,7 +114,7 @@ def envelope_deviation(signal: Vector, period: float) -> float:
     return float(np.sqrt(np.mean(deviation**2)) / abs(seen.mean()))
 
 
-def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vector) -> OpenLoopMultiplier:
+def _largest(found: Floats, gains: Floats, left: Floats, right: Floats, scale: Floats) -> OpenLoopMultiplier:
     """Return the largest multiplier, with an error from the residuals of blocks of periods (delta method)."""
     values, vectors = np.linalg.eig(found[:2].T / scale[:2])
     most = int(np.argmax(values.real))
@@ -130,7 +130,7 @@ def _largest(found: Table, gains: Table, left: Table, right: Table, scale: Vecto
 
 
 def _turn(motion: PerturbedMotion) -> Complexes:
-    """Return the carrier at the drive frequency, estimated from the base, because the clocks differ."""
+    """Return the carrier at the drive frequency; estimate it from the base, because the clocks differ."""
     turn = np.exp(-2j * np.pi * np.arange(len(motion.base)) / motion.period)
     inside = slice(motion.first, motion.first + round(2 * motion.periods * motion.period))
     phase = np.unwrap(np.angle(_envelope(motion.base, turn, motion.period, 0)[inside]))
@@ -138,7 +138,7 @@ def _turn(motion: PerturbedMotion) -> Complexes:
     return np.asarray(turn * np.exp(-1j * slope * np.arange(len(turn))))
 
 
-def _envelope(signal: Vector, turn: Complexes, period: float, order: int) -> Complexes:
+def _envelope(signal: Floats, turn: Complexes, period: float, order: int) -> Complexes:
     """Return a derivative of an envelope, per period, under a cos^4 window of several periods."""
     half = round(_HALF * period)
     place = np.arange(-half, half + 1) / half * np.pi / 2
@@ -152,10 +152,10 @@ def _envelope(signal: Vector, turn: Complexes, period: float, order: int) -> Com
     return np.asarray(fftconvolve(signal * turn, window / np.sum(cos**4), mode="same"))
 
 
-def _parts(columns: list[Complexes]) -> Table:
+def _parts(columns: list[Complexes]) -> Floats:
     return np.column_stack([part for each in columns for part in (each.real, each.imag)])
 
 
-def _detrend(table: Table) -> Table:
+def _detrend(table: Floats) -> Floats:
     line = np.column_stack([np.ones(len(table)), np.linspace(-1, 1, len(table))])
     return np.asarray(table - line @ np.linalg.lstsq(line, table, rcond=None)[0])

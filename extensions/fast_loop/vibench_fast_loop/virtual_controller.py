@@ -20,8 +20,8 @@ from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, ShakenMotion
 from vibench.virtual_rig.generator.scpi_instrument import Reply
+from vibench.virtual_rig.world.conversion import Signal
 from vibench.virtual_rig.world.sensors import SensorParts
-from vibench.virtual_rig.world.wiring import Signal
 
 from .protocol import (
     LOOP_PROTOCOL,
@@ -37,7 +37,7 @@ FloatArray = NDArray[np.float64]
 RAMP_S = 0.05
 """Duration of a ramp that the controller starts by itself [s]."""
 LONGEST_AT_LIMIT_S = 0.05
-"""Time at the output limit after which the law counts as failed and the output is ramped down [s]."""
+"""Time at the output limit after which the law counts as failed and the controller ramps down [s]."""
 MOST_BLOCKS = 2000
 """Maximum number of blocks kept for a host that does not request them."""
 
@@ -76,7 +76,7 @@ class VirtualController:
 
     @contextmanager
     def hold_state(self) -> Iterator[Structure]:
-        """Yield the state with which samples are processed; while it is yielded, the host cannot change it.
+        """Yield the state with which samples are processed; the host cannot change this state meanwhile.
 
         The state is a `Controller` of native/structures.hpp.
         """

@@ -7,7 +7,7 @@ limits of the generator, so that plans can be checked without pyvisa.
 from vibench.acquisition.drivers import GeneratorModel, Shape
 
 KEYSIGHT_33500B_MODEL = GeneratorModel(
-    # Keysight 33500B data sheet, the 20 MHz models; without a filter its memory plays up to 62.5 MSa/s.
+    # Keysight 33500B data sheet, 20 MHz models: without a filter, waveforms play at up to 62.5 MSa/s.
     name="Keysight 33500B",
     driver="vibench_more_drivers.keysight_33500b:Keysight33500B",
     open_range_vpp=(2e-3, 20.0),
@@ -16,7 +16,7 @@ KEYSIGHT_33500B_MODEL = GeneratorModel(
     memory_points=(8, 65_536),
     top_code=65_534,
     burst_cycles=(1, 100_000_000),
-    # The product numbers of models (one or two channels, 20 or 30 MHz) are taken from public programs.
+    # The product numbers of the models (one or two channels, 20 or 30 MHz) are from public programs.
     usb_ids=tuple((0x0957, product) for product in (0x2507, 0x2607, 0x2707, 0x2807, 0x2A07, 0x2B07, 0x2C07)),
-    longest_sweep_s=500.0,  # linear sweeps may last longer, logarithmic sweeps may not
+    longest_sweep_s=500.0,  # limit of logarithmic sweeps; linear sweeps may last longer
 )

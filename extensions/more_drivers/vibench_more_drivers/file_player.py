@@ -43,7 +43,7 @@ class FilePlayer:
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
-                'daq.driver = "file" plays back a recording, but the configuration names none; give '
+                'daq.driver = "file" plays back a recording, but the configuration names no recording; give '
                 'daq.options.recording = "PATH.h5"'
             )
         with ExitStack() as opening:
@@ -83,7 +83,7 @@ class FilePlayer:
 
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
-        """Converter step of each channel in the recording [V]; None if count zero is not zero volts."""
+        """Converter step of each channel in the recording [V]; None if a count of zero is not zero volts."""
         heads = (self._recording.channel(role) for role in self.roles)
         return tuple(None if head.volts_at_zero_count else head.volts_per_count for head in heads)
 
@@ -102,7 +102,7 @@ class FilePlayer:
         """
         if not self._is_running or samples < 1:
             raise InstrumentError(
-                f"{samples} samples were requested from a recording that is not playing; start it"
+                f"{samples} samples were requested from a recording that is not playing; start the recording"
             )
         first, last = self._next_sample, self._next_sample + samples
         if last > self._recording.samples:

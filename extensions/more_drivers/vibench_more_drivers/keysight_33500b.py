@@ -32,6 +32,7 @@ class Keysight33500B(AFG1022X):
         r"(AGILENT|KEYSIGHT) TECHNOLOGIES,335\d\dB", re.IGNORECASE
     )
     load_header: ClassVar[str] = "OUTP{c}:LOAD"
+    burst_channels: ClassVar[tuple[int, ...]] = (1, 2)
 
     shape = Word("SOUR{c}:FUNC", {"SIN": ("SIN",), "ARB": ("ARB",)})
     waveform = Word("SOUR{c}:FUNC:ARB", {_NAME: (_NAME,)})
@@ -74,12 +75,7 @@ class Keysight33500B(AFG1022X):
         """Play ``cycles`` periods at each trigger command."""
         with self._changing():
             self.trigger_source = "BUS"
-        self._arm_burst(cycles)
-
-    def end_burst(self) -> None:
-        """End the burst mode, so that the signal plays continuously."""
-        with self._changing():
-            self.burst = "OFF"
+        super().arm_burst(cycles)
 
     def _end_modes(self) -> None:
         """End sweep, burst and modulation; use peak-to-peak amplitudes; switch the waveform filter off."""
@@ -100,7 +96,7 @@ class Keysight33500B(AFG1022X):
         self.codes = codes
 
     def _upload(self, codes: ArbitraryCodes) -> None:
-        """Write the memory; compare the number and mean of its points, as the points cannot be read back."""
+        """Write the memory; verify the number and mean of the points, as the points cannot be read back."""
         source = f"SOUR{self.channel}:DATA"
         self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"

@@ -83,7 +83,7 @@ class _Card:
         with self.changed:
             if status.input_overflow or self.waiting > self.most_waiting:
                 self.failure = "samples were overwritten before they were read"
-            if not self.failure:  # after a failure, samples from the card are discarded
+            if not self.failure:  # discard the card's samples after a failure
                 self.blocks.append(heard.T[list(self.inputs)].astype(np.float64))
                 self.waiting += heard.shape[0]
             self.changed.notify_all()
@@ -158,8 +158,8 @@ class SoundCardDigitizer:
         if not abs(card.stream.samplerate - card.rate_hz) <= _SAME_RATE * card.rate_hz:
             card.stream.close()
             raise InstrumentError(
-                f"the sound card {rig.daq.device!r} runs at {card.stream.samplerate:g} samples a second, "
-                f"but {card.rate_hz:g} were requested; set daq.sample_rate_hz to a rate that it supports"
+                f"the sound card {rig.daq.device!r} runs at {card.stream.samplerate:g} samples a second, but "
+                f"{card.rate_hz:g} were requested; set daq.sample_rate_hz to a rate that the card supports"
             )
         return cls(card, rig, channels)
 
@@ -183,7 +183,7 @@ class SoundCardDigitizer:
         """Return the next samples; raises DataLost if some were overwritten, InstrumentLost if none came."""
         if not self._is_running or samples < 1:
             raise InstrumentError(
-                f"{samples} samples were requested from {self._device}, which is not sampling; start it"
+                f"{samples} samples were requested from {self._device}, which is not sampling; start the card"
             )
         card = self.card
         with card.changed:
@@ -191,7 +191,7 @@ class SoundCardDigitizer:
             came = card.changed.wait_for(lambda: card.failure or card.waiting >= samples, wait_s)
             if card.failure:
                 raise DataLost(
-                    f"{self._device}: {card.failure}. Stop, and read more often or raise daq.buffer_s"
+                    f"{self._device}: {card.failure}. Stop, then read more often, or raise daq.buffer_s"
                 )
             if not came:
                 raise InstrumentLost(f"{self._device} delivers no more samples; check that it is plugged in")
@@ -206,7 +206,7 @@ class SoundCardDigitizer:
 
     @property
     def waiting_samples(self) -> int:
-        """Number of samples per channel that are not read yet."""
+        """Number of samples per channel that have not been read yet."""
         return self.card.waiting
 
     def stop(self) -> None:
@@ -244,7 +244,7 @@ class SoundCardOutput:
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: SoundCardDigitizer) -> Self:
-        """Open the output of the stream; raises ConfigurationError for a wrong rate or too high a limit."""
+        """Open the output of the stream; raises ConfigurationError for a wrong rate or an excessive limit."""
         output = cls(physical, config, digitizer)
         if config.sample_rate_hz != digitizer.sample_rate_hz or config.limit_v > output._full_scale_v:
             raise ConfigurationError(
@@ -306,9 +306,9 @@ def _require_calibration(rig: Rig) -> None:
     needed = (*_NEEDED, "output_full_scale_v") if rig.daq.output is not None else _NEEDED
     if missing := [key for key in needed if key not in rig.daq.options]:
         raise ConfigurationError(
-            f"a sound card must be calibrated, but daq.options lacks {', '.join(missing)}. Nothing was "
-            "opened; record a known sine with it, measure its output voltage at full scale, and enter these "
-            "values (docs/instruments.md)"
+            f"a sound card must be calibrated, but daq.options has no {', '.join(missing)}. Nothing was "
+            "opened; record a known sine with the card, measure the card's output voltage at full scale, "
+            "and enter these values (docs/instruments.md)"
         )
     for key in needed[1:]:
         value = rig.daq.options[key]
@@ -340,6 +340,6 @@ def _number(name: str, side: str) -> int:
     number = name.removeprefix(side)
     if number == name or not number.isdecimal():
         raise ConfigurationError(
-            f"physical = {name!r} is not on a sound card; inputs are in0, in1, ..., outputs ao0, ao1, ..."
+            f"physical = {name!r} is not on a sound card; inputs are in0, in1, ...; outputs are ao0, ao1, ..."
         )
     return int(number)

@@ -47,7 +47,7 @@ class Keysight33500B(AFG1022):
     """The generator; see `AFG1022`. Waveforms have names; sweeps have a duration, hold time and trigger."""
 
     maker, model, firmware = "Agilent Technologies", "33522B", "4.00-1.19-2.00-52-00"
-    points, top_code = (8, 1_048_576), 65_534  # the codes -32767 to 32767 are shifted to start at zero
+    points, top_code = (8, 1_048_576), 65_534  # codes -32767 to 32767, shifted to begin at zero
     defaults = _Settings()
 
     def __init__(self, *arguments: object, **options: object) -> None:
@@ -60,7 +60,7 @@ class Keysight33500B(AFG1022):
 
 
 def _name(parameter: bytes) -> str:
-    """Return a waveform's name in quotes, which distinguish it from the names of other memories."""
+    """Return a waveform's name in quotes; the quotes distinguish it from the names of other memories."""
     bare = scpi.text(parameter).strip('"').upper()
     return f'"{bare}"'
 

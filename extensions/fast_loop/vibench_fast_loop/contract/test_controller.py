@@ -6,7 +6,7 @@ from typing import cast
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench.bench import Bench
+from vibench.acquisition.bench import Bench
 from vibench.acquisition.contract.conftest import LEVEL, line_v, measured_v, refusal
 from vibench.acquisition.instruments import PlugInKind, Samples
 from vibench.acquisition.rig import LoopInput, Role
@@ -100,7 +100,7 @@ def test_a_feedback_law_adds_its_response_to_the_played_series(bench: Bench) -> 
     _, blocks = read_with_requests(bench, 0.8)
     of_base = controller_of(bench).facts.pd_of in (None, LoopInput.BASE)
     gain = LAW * level_v(bench) / abs(response_to(blocks[-1], of_base))
-    # The law weights this sample and the previous one, its memory, as a proportional-derivative law does.
+    # As a proportional-derivative law does, this law weights the newest and the previous sample.
     into = (1.0, 0.0) if of_base else (0.0, 1.0)
     direct = (0.5 * gain * into[0], 0.5 * gain * into[1])
     law = LoopFeedback(step=((0.0,),), inlet=(into,), output=(0.5 * gain,), direct=direct)
