@@ -24,17 +24,16 @@ from independent_solution import (
 )
 from stroboscopic_section import stroboscopic_section
 
+from vibench.sim.engine.run import Accuracy
 from vibench.sim.exponents.lyapunov import lyapunov_exponent
 from vibench.sim.motion.integrate import integrate
-from vibench.sim.motion.poincare import flow_derivative, smallest_period
 from vibench.sim.motion.response import steady_response
+from vibench.sim.periodic.shooting import flow_derivative, smallest_period
 from vibench.sim.scene.prediction import Ensemble, FoundMotion, MotionKind, ScenePrediction
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Scene
 from vibench.sim.scene.solve import solve_ensemble, solve_scene
-from vibench.sim.specimen.accuracy import Accuracy
 from vibench.sim.specimen.drive import Harmonic
-from vibench.sim.specimen.specimen import Specimen, gong2025, state_scales
-from vibench.sim.specimen.state import Floats
+from vibench.sim.specimen.specimen import Floats, Specimen, gong2025, state_scales
 from vibench.sim.study import software
 
 SEED = 4242

@@ -37,12 +37,13 @@ def accuracy_document(benchmark: AccuracyBenchmark) -> str:
 
 
 def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
+    *others, last = (f"{each.promise:.0e} ({each})" for each in Accuracy)
     yield from (
         "# Speed and accuracy",
         "",
         "`standard` is the default accuracy level of a simulation. Use `quick` for a first look, and",
         "`reference` to check a result. In a periodic motion, the error of the state is at most",
-        f"{', '.join(f'{each.promise:.0e} ({each})' for each in Accuracy)}, in units of 100 µm for",
+        f"{', '.join(others)} or {last}, in units of 100 µm for",
         "displacements and 0.1 m/s for velocities. In chaos, no accuracy level predicts a single motion;",
         "only averages are meaningful.",
     )
@@ -56,7 +57,7 @@ def _lines(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "`work_precision.py` make this page; do not edit it by hand.",
         f"The tables below (vibench {software['vibench']}; {benchmark.machine}) show:",
         "",
-        "- speed: simulated seconds per second of one core;",
+        "- speed: duration of motion that one core simulates in a second [s];",
         "- state error: the largest error of the six components of the state, in the units above, relative",
         "  to an independent solution (scipy's DOP853 with tolerance 1e-12, restarted at every contact);",
         "- Response I and II errors: relative differences from level `reference`;",
@@ -82,8 +83,8 @@ def _share_section(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "motion. The table compares the predicted share of starts that reach each motion with the share in",
         f"{lotteries[0].starts} further runs, whose starts differ by a millionth of the gap.",
         "`periodic, 1` is a motion that repeats after one drive period. In 19 of 20 predictions, all",
-        "intervals contain the true shares. *Relative time* is a prediction's computing time over that of a",
-        "single run.",
+        "intervals contain the true shares. *Relative time* is the computing time divided by a",
+        "single run's time.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -174,7 +175,7 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         "",
         "## Promised and measured errors",
         "",
-        "State errors without contact and in periodic motion:",
+        "Errors of the state without contact and in periodic motion:",
         "",
         "| level | promised | largest measured | within the promise |",
         "|---|---|---|---|",

@@ -27,13 +27,13 @@ import numpy as np
 from scipy.optimize import root
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.excitation.feedback import Settling
+from vibench.acquisition.excitation.plan import Settling
 from vibench.acquisition.plan import Measurement, ResonanceTracking
 from vibench.acquisition.recording import ResonanceNote, feedback_note
 from vibench.acquisition.rig import Rig, amplifier_of, confirm_simulated, load_rig, shaker_of, specimen_of
 from vibench.sim import Branch, PhaseReference, Specimen, phase_resonance_branch
 from vibench.sim.periodic.restoring_force import spring_of
-from vibench_fast_loop.plant import LoopTiming, SampledPlant
+from vibench_fast_loop.law import LoopTiming, SampledPlant
 
 GAINS_DB = -20.0, 10.0
 K1 = 2.1e-3 * (2 * np.pi * 100) ** 2

@@ -1,4 +1,4 @@
-"""Measure the cost of a requested error: three figures and the first section of docs/accuracy.md.
+"""Measure the cost of a target error: three figures and the first section of docs/accuracy.md.
 
 ``python benchmarks/error_curves.py --markdown docs/accuracy.md`` draws three figures: error over time for the
 paper's four cases; similarity of continuous models over their computing time; error of a mean in chaos over
@@ -28,7 +28,7 @@ from vibench.analysis.report import (
     table,
 )
 from vibench.sim import Accuracy, Harmonic, Scene, Target, gong2025, solve_scene
-from vibench.sim.accuracy_benchmark.curve import CurvePoint, scene_curve
+from vibench.sim.accuracy_benchmark import CurvePoint, scene_curve
 from vibench.sim.engine.run import Watch
 from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.scene.mean_of_starts import mean_error
@@ -229,8 +229,10 @@ def section(curves, models, chaos):
     yield from (
         HEADING,
         "",
-        "Request a relative error of the responses (below 100 %), a time limit, or both:",
-        "`vibench predict --error 1% --time 2s`. The result states the relative error reached.",
+        "Give a target for the relative error of the responses (below 100 %), a time limit, or both:",
+        "`vibench predict --amplitude 5e-6 --frequency 260 --error 1% --time 2s`. Target and time apply to",
+        "each frequency. The result states the relative error reached; if the target is missed, also the",
+        "time needed, if known (exit code 0).",
         f"Tables and pictures are from vibench {json.loads(software())['vibench']};",
         "times are processor times of one core.",
         "",
@@ -238,14 +240,14 @@ def section(curves, models, chaos):
         "",
         "`vibench tradeoff --out DIR` draws this picture on your machine.",
         "",
-        "- Newton's iteration finds stable periodic motions; a smaller requested error takes no longer.",
+        "- Newton's iteration finds stable periodic motions; a smaller target takes no longer.",
         "- In chaos, the result is a mean over runs from different initial conditions (*starts*). In 19 of",
         "  20 cases, other starts change this mean by at most the stated error, which no accuracy level",
-        "  reduces. It does not include rare motions that no start has reached: n starts miss a motion of up",
-        "  to 3/n of all starts in 1 of 20 cases. A single run may differ far more.",
+        "  reduces. The stated error does not include motions that no start has reached: with n starts, a",
+        "  motion reached by 3/n of all starts is missed in 1 of 20 cases. A single run may differ far more.",
         "",
         (
-            "| contact law, drive | requested error | stated error | time "
+            "| contact law, drive | target error | stated error | time "
             "| stated error of a 30 s run at `standard` | time of this run |"
         ),
         "|---|---|---|---|---|---|",
@@ -259,10 +261,10 @@ def section(curves, models, chaos):
         "",
         "![Similarity R of continuous models and stops, over processor time](images/model_similarity.png)",
         "",
-        "The paper replaces the stops (`hertz`) by odd powers n of p, m1's displacement relative to m2",
-        "(`power:n`; `3+5` is a sum). R is the share of frequencies at which Response I of a model agrees",
-        f"with that of the stops (eqs. 6 and 7), from {GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of",
-        "20 Hz. Each run is 30 s from rest.",
+        "The paper replaces the stops (`hertz`) by forces proportional to p^n with odd n (`power:n`; `3+5`",
+        "is a sum); p is m1's displacement relative to m2. R is the share of frequencies",
+        f"({GRID_HZ[0]:g} to {GRID_HZ[-1]:g} Hz in steps of 20 Hz) at which a model and the stops agree in",
+        "Response I (eqs. 6 and 7). Each run is 30 s from rest.",
         "",
         "Up to 10 µm, `hertz` is faster than the continuous models. At 50 µm, models of low order are faster",
         "than `hertz`, but agree less often.",
@@ -280,15 +282,15 @@ def section(curves, models, chaos):
         "",
         "![Stated error over processor time, by window and number of starts](images/chaos_error.png)",
         "",
-        f"Chaos at {PAPER_HZ:g} Hz and 5 µm, after {LEAD_S:g} s of settling: largest stated error of the",
-        "four responses (I and II of m0 and p), and processor time.",
+        f"The table is for chaos at {PAPER_HZ:g} Hz and 5 µm after {LEAD_S:g} s of settling. Each cell shows",
+        "the largest stated error of the four responses (I and II of m0 and p), and the processor time.",
         "",
         "- The stated error falls with the square root of the number of starts.",
         "- Windows far shorter than the settling time take more time, because every run must settle first.",
         "- Response I is the largest value in the window, so it depends on `--window` (default 5 s).",
         "- Figure 3 of the paper at 1 % (240 points) needs 250,000 s of simulated motion. 13 points take two",
-        "  thirds of the time, with up to 5400 starts. In most, responses differ by up to 40 % between",
-        "  starts, often because chaos ends randomly.",
+        "  thirds of the time, with up to 5400 starts. At most of these points, responses differ by up to",
+        "  40 % between starts, often because chaos ends randomly.",
         "",
         "| window | " + " | ".join(f"{count} starts" for count in COUNTS) + " |",
         "|---|" + "---|" * len(COUNTS),

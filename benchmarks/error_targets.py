@@ -1,7 +1,7 @@
-"""Test coverage and cost of predictions with a requested error, on random scenes of all contact laws.
+"""Test coverage and cost of predictions with a target error, on random scenes of all contact laws.
 
 ``python benchmarks/error_targets.py --seed S --count 200 [--shard 1/4] --save FILE``. Each scene is predicted
-with five requested errors. The true value is computed at level *reference*: for a periodic motion after a
+with five target errors. The true value is computed at level *reference*: for a periodic motion after a
 long run, for one initial state and a stated window from the same window. With sensitive dependence, it is the
 mean over other initial states at *quick*. If the error of the true value exceeds a hundredth of the stated
 error, it is allowed too. An existing file is continued; ``--sum FILES`` combines several.
@@ -54,14 +54,14 @@ LONG_S = 60.0
 """Time after which a damped motion of these scenes has settled [s]."""
 SHORT, SMALL = 0.1, 1e-3
 """With sensitive dependence, no mean reaches errors up to SMALL; they get the share SHORT of the time."""
-KINDS = ("periodic", "named window", "start lost")
-HEADING, LAST = "## Requested errors", "## Other solvers"
+KINDS = ("periodic", "not repeating", "start lost")
+HEADING, LAST = "## Target errors", "## Other solvers"
 INTRODUCTION = """Groups of random predictions:
 
 - *periodic*: the motion repeats.
-- *named window*: the motion does not repeat. The responses depend on the window that the result states.
+- *not repeating*: the responses depend on the window (end of the run), whose length the result states.
 - *start lost*: the motion depends sensitively on the initial conditions (the *start*). The result is the mean
-  response over several starts in a named window."""
+  response over several starts in such a window."""
 ON_THE_PAGE = ("1 %", "0.01 %", "all")
 NAMES = ("response_i", "response_ii", "relative_i", "relative_ii")
 
@@ -143,7 +143,7 @@ def solve_and_measure(scene, time_s):
             if found.memory is StartMemory.LOST
             else "periodic"
             if found.motion is MotionKind.PERIODIC
-            else "named window"
+            else "not repeating"
         )
         if found.response_i is None:
             row["targets"].append({"error": error, "refusal": found.ended})
@@ -181,7 +181,7 @@ def scene_pairs(rows):
 
 
 def groups_of(rows):
-    """Yield the results for each kind of motion and requested error: labels, then numbers."""
+    """Yield the results for each kind of motion and target error: labels, then numbers."""
     answered = scene_pairs(rows)
     for kind in KINDS:
         for error in (*ERRORS, None):
@@ -213,14 +213,14 @@ def costs_of(rows):
         for kind in KINDS
     )
     shares = (f"{np.median(own):.1f} for *{kind}*" for kind, own in ratios if own)
-    yield f"The median ratio of times (default run over run for 1 %) is {whole}, {', '.join(shares)}."
+    yield f"The median ratio of times (default run divided by run for 1 %) is {whole}, {', '.join(shares)}."
     costs = [
         {each["error"]: each["taken_s"] for each in row["targets"] if each.get("kind") == KINDS[0]}
         for row in rows
     ]
     ratios = [each[1e-6] / each[0.01] for each in costs if {1e-6, 0.01} <= each.keys()]
     ratio = f"{np.median(ratios):.2f} times as long as 1e-2 (median of {len(ratios)} cases)"
-    yield f"In periodic motion, a requested error of 1e-6 takes {ratio}."
+    yield f"In periodic motion, a target of 1e-6 takes {ratio}."
 
 
 def report(rows):
@@ -250,14 +250,14 @@ def write_section(page, rows, time_s):
         "",
         INTRODUCTION,
         "",
-        f"The time limit of each prediction is {time_s:g} s on a busy machine. It is {SHORT * time_s:g} s",
-        f"for motions with *start lost* if the requested error is at most {100.0 * SMALL:g} %. *Covered*",
+        f"The time limit of each prediction on a busy machine is {time_s:g} s, but {SHORT * time_s:g} s",
+        f"for motions with *start lost* and a target error of at most {100.0 * SMALL:g} %. *Covered*",
         "responses differ from the true value by at most the stated error plus the true value's error. True",
-        "values come from level `reference`; with *start lost*, they are means over other starts at level",
+        "values come from level `reference`; with *start lost*, from means over other starts at level",
         "`quick`.",
         "",
         (
-            "| motion | requested error | predictions | covered | requested error reached "
+            "| motion | target error | predictions | covered | target error reached "
             "| median stated error | median time |"
         ),
         "|---|---|---|---|---|---|---|",

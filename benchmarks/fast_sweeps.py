@@ -24,8 +24,8 @@ from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Measurement, SineSweep
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files
-from vibench.analysis.sine.collision_region import Collisions, collisions
 from vibench.analysis.sine.sweep import SweepResponse, SweepSums
+from vibench.analysis.sine.sweep_analysis import Collisions, collisions
 from vibench.sim import Sampled, Specimen, base_transmissibility, gong2025, integrate
 
 RATE_HZ = 12_800.0

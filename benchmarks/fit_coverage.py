@@ -36,11 +36,10 @@ from vibench.analysis import (
     analyse_files,
     update_model,
 )
-from vibench.analysis.fit.parameters import Parameter
-from vibench.analysis.fit.specimen_fit import fit_specimen
-from vibench.analysis.fit.suspects import Assumption
+from vibench.analysis.fit.lines import Parameter
+from vibench.analysis.fit.specimen_fit import Assumption, fit_specimen
 from vibench.analysis.fit.updated_specimen import UpdatedSpecimen
-from vibench.analysis.frequency_response.distortion import scatters_beyond_noise
+from vibench.analysis.frequency_response.noise_response import scatters_beyond_noise
 from vibench.analysis.frequency_response.periodic import PeriodicSums
 from vibench.analysis.frequency_response.results import (
     FrequencyResponseSettings,

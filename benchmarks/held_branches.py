@@ -31,7 +31,7 @@ from vibench.acquisition import (
     open_recording,
     run_measurement,
 )
-from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.excitation.plan import BaseLevel
 from vibench.acquisition.recording import (
     BranchEndNote,
     BranchPointNote,
@@ -58,8 +58,7 @@ from vibench.virtual_rig import VirtualRig
 from vibench_fast_loop import continuation_controller as _continuation_controller
 from vibench_fast_loop.branch_continuation import BranchContinuation
 from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
-from vibench_fast_loop.law import design_law
-from vibench_fast_loop.plant import LoopTiming, SampledPlant
+from vibench_fast_loop.law import LoopTiming, SampledPlant, design_law
 
 NOISES = (
     "generator_noise_v",

@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from vibench.cli.paper.textbook_methods import numbers_of, rates
 from vibench.sim import Harmonic, NoContact, Specimen, spring_of
-from vibench.sim.specimen.state import Floats
+from vibench.sim.specimen.specimen import Floats
 
 Rates = Callable[[float, Floats], Floats]
 """Function from time and state to d state / dt, for general solvers."""

@@ -26,7 +26,7 @@ from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
 EXTRAS = ("none", "figures", "bench", "gui")
-"""Extras; each includes the ones before it."""
+"""Extras; each includes all previous extras."""
 PREDICT = ("predict", "--model", "hertz", "--amplitude", "5e-6", "--frequency", "260", "--json")
 
 

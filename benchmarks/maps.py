@@ -1,4 +1,4 @@
-"""Test the shares that a basin map states with independent initial states; measure the cost of maps.
+"""Test the shares of a basin map against independent initial states; measure the cost of maps.
 
 `basin` draws random initial states from the rectangle of a basin map, and compares the motions they reach
 with the stated shares. `map` computes a map with the given number of points, and prints processor time, time

@@ -1,4 +1,4 @@
-"""Print the lines of each mechanism at a commit and now, as a table for docs/architecture.md.
+"""Print the lines of each mechanism at a commit and now, as a table.
 
     python benchmarks/mechanism_sizes.py [--before COMMIT]
 
@@ -18,8 +18,11 @@ SIM, ANALYSIS = "sim/vibench/sim/", "analysis/vibench/analysis/"
 DRIVERS, RIG = "acquisition/vibench/acquisition/drivers/", "virtual_rig/vibench/virtual_rig/"
 MORE = "extensions/more_drivers/vibench_more_drivers/"
 INSTRUMENTS = [RIG + name for name in ("daqmx/*", "generator/*", "usb/*")]
-RESULTS = [ANALYSIS + name for name in ("tables.py", "results/*", "report/*", "kinds/*")]
-AFG = [DRIVERS + name for name in ("_afg1022*", "_generator_limits.py", "_scpi.py", "_visa_link.py")]
+RESULTS = [ANALYSIS + name for name in ("tables.py", "results/*", "report/*", "kinds/*", "kinds.py")]
+AFG = [
+    DRIVERS + name
+    for name in ("_afg1022*", "_generator_limits.py", "_limits.py", "_scpi.py", "_visa_link.py")
+]
 ENGINES = ("collision", "contact", "flight", "kernels", "lanes", "power_law", "rigid", "slots", "stepping")
 EXECUTORS = [SIM + "study/_executor.py", SIM + "study/_cluster.py"]
 MECHANISMS = {
@@ -37,7 +40,7 @@ MECHANISMS = {
             *EXECUTORS,
             SIM + "study/_threads.py",
         ],
-        [SIM + "background.py", "gui/*/background/*", *EXECUTORS],
+        [SIM + "background.py", "gui/*/background.py", *EXECUTORS],
     ),
     "commands and options": (["cli/*"], ["cli/*"]),
     "results and reports": (RESULTS, RESULTS),
@@ -46,7 +49,7 @@ MECHANISMS = {
     "virtual instruments": (INSTRUMENTS, [*INSTRUMENTS, MORE + "virtual_*"]),
     "paper": (
         [SIM + "accuracy_benchmark/*", ANALYSIS + "reproduction/*", ANALYSIS + "paper_figures/*"],
-        [SIM + "accuracy_benchmark/*", "studies/*"],
+        [SIM + "accuracy_benchmark.py", "studies/*"],
     ),
 }
 

@@ -21,8 +21,7 @@ from stroboscopic_section import stroboscopic_section
 
 import vibench.cli.environment  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.analysis import motion_verdict
-from vibench.analysis.chaos.period import Points
-from vibench.analysis.chaos.verdict import MotionKind
+from vibench.analysis.chaos.verdict import MotionKind, Points
 from vibench.sim import Harmonic, gong2025
 
 DRIVE_HZ = 260.0

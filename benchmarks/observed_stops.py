@@ -21,8 +21,7 @@ from vibench.sim import Harmonic
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.periodic.shooting import PeriodMap
 from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
-from vibench_fast_loop.law import NOISE, PUSH_N, VOLT, design_law
-from vibench_fast_loop.plant import LoopTiming, SampledPlant
+from vibench_fast_loop.law import NOISE, PUSH_N, VOLT, LoopTiming, SampledPlant, design_law
 
 SUBSTEPS = 40
 """Number of parts of a sample, because contacts are shorter than a sample."""

@@ -1,7 +1,7 @@
 """Measure the computing time of the paper's Figures 3 and 10: ``python benchmarks/paper_figures.py``.
 
 The figures have every hertz from 10 to 600 at four amplitudes, 30 s each with the last 5 s observed, at
-standard accuracy; Figure 10 also has exponents. "3 to 1 %" is Figure 3 with a requested error at every tenth
+standard accuracy; Figure 10 also has exponents. "3 to 1 %" is Figure 3 with a target error at every tenth
 hertz, and at most five seconds per point. A further curve has 121 points at 20 um, with other initial states
 where needed, as `vibench predict` computes it. Each runs on one thread per processor, in batches as for a
 study of this size, and one motion after the other.

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vibench.cli.paper.case import ALIKE, BY_ODE45, SCORED_S, Case, damping
+from vibench.cli.paper.options import ALIKE, BY_ODE45, SCORED_S, Case, damping
 from vibench.cli.paper.reading import MODERATE_M, Evidence, Reading
 from vibench.cli.paper.textbook_methods import Tableau, TextbookMethod, march, ode45, textbook_exponents
 from vibench.sim import Accuracy, Harmonic, base_transmissibility

@@ -20,8 +20,7 @@ from scipy.io import loadmat
 
 from vibench.acquisition import load_toml, open_recording
 from vibench.analysis.exchange import ImportMapping, import_recording
-from vibench.analysis.tones.order_tracking import track_orders
-from vibench.analysis.tones.sine_fit import fit_sine, steady_phase
+from vibench.analysis.tones import fit_sine, steady_phase, track_orders
 
 EXCERPTS = Path(__file__).parents[1] / "tests/analysis/exchange/flutter_rig"
 NEAR_HZ, PERIODS = 2.45, 5

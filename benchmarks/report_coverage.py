@@ -31,7 +31,7 @@ from vibench.acquisition import LimitExceeded, open_bench, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep, SteppedSine, WhiteNoise
 from vibench.acquisition.rig import Rig, specimen_of
 from vibench.analysis import AnalysisError, Simulation, analyse_files, budgets_of
-from vibench.analysis.frequency_response.distortion import scatters_beyond_noise
+from vibench.analysis.frequency_response.noise_response import scatters_beyond_noise
 from vibench.sim import Specimen, base_transmissibility
 
 REPEATS = 8

@@ -392,8 +392,11 @@ def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
     from PySide6.QtCore import QTimer  # noqa: PLC0415 - of this subject only
 
     from vibench.gui.page.app_context import AppContext, Settings  # noqa: PLC0415
-    from vibench.gui.window.open_window import application  # noqa: PLC0415
-    from vibench.gui.window.window import PAGES, Window  # noqa: PLC0415
+    from vibench.gui.window.window import (  # noqa: PLC0415
+        PAGES,
+        Window,
+        application,
+    )
 
     app = application(["vibench"])
     window = Window(AppContext(Settings(request.folder.with_suffix(".ini"))), PAGES)

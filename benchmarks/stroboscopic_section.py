@@ -3,8 +3,8 @@
 from numpy.typing import ArrayLike
 
 from vibench.sim import Accuracy, Harmonic, Specimen, integrate
-from vibench.sim.specimen.outcome import Outcome
-from vibench.sim.specimen.state import Floats
+from vibench.sim.engine.run import Outcome
+from vibench.sim.specimen.specimen import Floats
 
 
 def stroboscopic_section(

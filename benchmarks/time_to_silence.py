@@ -7,7 +7,7 @@ This process runs the virtual rig in real time, and a witness that records when 
 last loud. The engine is a separate process, which reaches the rig as it reaches real instruments. A cell of
 the table is one run. It is brought into a state, the condition is created, the cause happens, and the witness
 waits for silence. Time counts from the cause, or from the engine's continuation if it was suspended.
-``--cells 0.1`` measures a tenth of the cells, drawn with the seed. The second form counts how often a living
+``--cells 0.1`` measures a tenth of the cells, drawn with the seed. The second form counts how often a running
 engine was not found, through the client and through the command. Linux only.
 """
 
@@ -134,7 +134,7 @@ class WatchedRun:
         return self.run_state() == state and time.monotonic() - self.witness.last_loud_s < 0.1
 
     def stop_into(self, state: str) -> None:
-        """Request the stop that leads to a state, if one does, and wait for the state."""
+        """Request the stop that leads to a state, if there is one, and wait for the state."""
         if state in STOP_INTO:
             self.client.stop(STOP_INTO[state])
         self.wait_until(lambda: self.run_state() == state, state)
@@ -398,7 +398,7 @@ def table(laboratory: Laboratory, share: float, seed: int) -> bool:
 
 
 def try_conditions(laboratory: Laboratory, tries: int, commands: int) -> bool:
-    """Count how often a living engine is not found under each condition; return whether it always was."""
+    """Count how often a running engine is not found under each condition; return whether it always was."""
     missed = 0
     for condition, make in CONDITIONS.items():
         laboratory.ready()
@@ -424,7 +424,7 @@ def try_conditions(laboratory: Laboratory, tries: int, commands: int) -> bool:
                 missed += "no engine" in said.stderr
                 delivered[how] = delivered.get(how, 0) + 1
         print(f"{condition}: {delivered} in {time.monotonic() - began_s:.0f} s", flush=True)
-    print(f"a living engine was not found {missed} times")
+    print(f"a running engine was not found {missed} times")
     return missed == 0
 
 

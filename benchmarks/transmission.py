@@ -13,7 +13,7 @@ import numpy as np
 from scipy import signal
 from separate_process import run_separately
 
-from vibench.analysis.spectra.spectra import SegmentSpectra
+from vibench.analysis.spectra import SegmentSpectra
 
 RATE_HZ = 51_200
 CHANNELS = 4

@@ -31,7 +31,7 @@ from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine,
 from vibench.acquisition.recording import Recording
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
-from vibench.analysis.kinds.analyses import ANALYSES
+from vibench.analysis.kinds import ANALYSES
 from vibench.analysis.overlay.ensemble import EnsembleCurve, z_limit
 from vibench.analysis.recordings.checks import AbstractAnalysis
 from vibench.analysis.results.campaign_results import overlay

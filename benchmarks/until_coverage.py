@@ -44,7 +44,7 @@ from vibench.acquisition.rig import Rig, load_rig, specimen_of
 from vibench.analysis import AnalysisError, ExpectedResult, budgets_of, expected_uncertainty
 from vibench.analysis.frequency_response.resonance import resonances
 from vibench.analysis.frequency_response.transmissibility import transmissibility
-from vibench.analysis.kinds.analysis_kind import AnyResult
+from vibench.analysis.kinds import AnyResult
 from vibench.analysis.recordings.facts import recording_facts
 from vibench.analysis.results.growing_bounds import bounds_of, random_bound, result_so_far
 from vibench.analysis.sine.dwell import dwell_response

@@ -20,8 +20,8 @@ from vibench.acquisition.rig import Rig, load_rig
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator.afg1022 import AFG1022
 from vibench.virtual_rig.generator.terminal_voltage import Terminal
+from vibench.virtual_rig.world.conversion import Coupling, Input
 from vibench.virtual_rig.world.time_grid import USUAL_GRID
-from vibench.virtual_rig.world.wiring import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
 RATE_HZ = 51_200

@@ -28,7 +28,7 @@ from vibench.gui.pages.compare.compare_page import ComparePage
 from vibench.gui.pages.files.files_page import FilesPage
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.gui.window.event_loop_monitor import EventLoopMonitor
-from vibench.gui.window.open_window import application
+from vibench.gui.window.window import application
 
 SIZE = (1400, 900)
 SPANS_S = (600.0, 60.0, 6.0, 2.4, 0.6, 0.06)

@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent
 STARTED = """
 import sys, time
 from pathlib import Path
-from vibench.gui.window.open_window import application
+from vibench.gui.window.window import application
 from vibench.gui.page.app_context import AppContext
 from vibench.gui.window.window import PAGES
 from vibench.gui.page.app_context import Settings

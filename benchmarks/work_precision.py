@@ -27,7 +27,7 @@ from scipy.integrate import solve_ivp
 
 from vibench.sim import Accuracy, PowerLaw
 from vibench.sim.scene.followed_run import FollowedRun
-from vibench.sim.specimen.state import Floats
+from vibench.sim.specimen.specimen import Floats
 
 PERIODIC_S, CHAOTIC_S = 0.2, 0.03
 """Spans for errors [s]; in 0.03 s, chaos of 112 per second magnifies an error only by e^3."""
@@ -290,10 +290,10 @@ def write_section(page, curves):
         "",
         f"Measured with vibench {version('vibench')}.{absent}",
         "",
-        "The first row has vibench's simulated seconds per second (error in brackets). Other cells have:",
+        "First row: seconds that vibench simulates per second (error in brackets). Other cells:",
         "",
-        "1. the solver's time over vibench's time, for the same error (`never`: this error is not reached);",
-        "2. this ratio of times at a solver tolerance of 1e-6 (`gave up`: the solver failed);",
+        "1. the solver's time divided by vibench's time for the same error (`never`: error not reached);",
+        "2. the same ratio at a solver tolerance of 1e-6 (`gave up`: the solver failed);",
         "3. in brackets, the solver's error at this tolerance.",
         "",
         "![Error over cost of each solver](images/work_precision.png)",

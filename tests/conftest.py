@@ -52,6 +52,7 @@ def pytest_report_header() -> str:
 
 
 LONG = (
+    "tests/robot/test_robot.py",
     "tests/cli/test_demo.py",
     "tests/sim/chain/test_integrate.py",
     "tests/sim/exponents/test_lyapunov_spectrum.py",

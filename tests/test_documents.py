@@ -19,6 +19,7 @@ from vibench.acquisition.instruments import PlugInKind
 from vibench.acquisition.plan import Measurement, WhiteNoise
 from vibench.analysis import analyse
 from vibench.cli.__main__ import COMMANDS, app
+from vibench.stop_files import SWITCH_OFF
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -51,6 +52,7 @@ PLAIN = {
     "whoever": "anyone who",
 }
 """Words that are hard to read, and their plain replacements."""
+WORN = re.compile(rf"\b(?:{'|'.join(PLAIN)})\b", flags=re.I)
 
 
 def every_document(faults):
@@ -116,6 +118,11 @@ def test_every_vibench_import_in_a_document_works(document):
                     if not resolves(f"{node.module}.{each.name}")
                 ]
     return missing
+
+
+def test_the_page_named_in_the_message_on_a_drive_that_may_be_on_explains_this_message():
+    (page,) = PATH.findall(SWITCH_OFF)
+    assert SWITCH_OFF.split(":")[0] in text_of(ROOT / page)
 
 
 BLOCK = re.compile(r"^```\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
@@ -190,7 +197,7 @@ def ordered_subpackages():
 
 
 @pytest.mark.parametrize(("package", "rooms"), list(ordered_subpackages()))
-def test_the_architecture_page_lists_subpackages_in_order_with_docstrings(package, rooms):
+def test_the_architecture_page_lists_subpackages_in_order_with_their_docstrings(package, rooms):
     _, section = text_of(ROOT / "docs" / "architecture.md").split(f"### `{package}`\n")
     listed = re.findall(r"^\| `(\w+)` \| (.+) \|$", section.split("\n### ")[0].split("\n## ")[0], flags=re.M)
     said = [importlib.util.find_spec(f"{package}.{room}") for room in rooms]
@@ -201,7 +208,7 @@ def test_the_architecture_page_lists_subpackages_in_order_with_docstrings(packag
 def worn_words(text):
     """Return the words of `PLAIN` in a text, outside code."""
     prose = re.sub(r"`[^`]*`", "", re.sub(r"^```.*?^```", "", text, flags=re.S | re.M))
-    return {word: plain for word, plain in PLAIN.items() if re.search(rf"\b{word}\b", prose, flags=re.I)}
+    return {word: PLAIN[word] for word in map(str.lower, WORN.findall(prose))}
 
 
 @every_document
@@ -233,7 +240,7 @@ def test_the_changelog_of_the_version_has_a_date_and_takes_at_most_three_minutes
     assert len(section[1].split()) <= 3 * 200
 
 
-def test_the_readme_links_tasks_verdicts_units_and_a_glossary_that_defines_undecided():
+def test_the_readme_links_to_tasks_and_verdicts_and_units_and_a_glossary_that_defines_undecided():
     linked = LINK.findall((ROOT / "README.md").read_text(encoding="utf-8"))
     assert {"docs/tasks.md", "docs/verdicts.md", "docs/sensor-units.md", "docs/glossary.md"} <= {*linked}
     assert "| undecided |" in (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
@@ -252,7 +259,7 @@ def test_pyproject_states_systems_and_status_and_no_version_limit_expires_within
 
 
 @pytest.mark.thorough
-def test_the_transmissibility_computed_by_hand_equals_that_of_the_analysis(tmp_path, monkeypatch):
+def test_the_analysis_gives_the_same_transmissibility_as_a_calculation_by_hand(tmp_path, monkeypatch):
     path = tmp_path / "noise_recordings" / "weak.h5"
     path.parent.mkdir()
     band = {"band_start_hz": 50, "band_stop_hz": 600, "repetition_hz": 1}

@@ -28,7 +28,7 @@ def lines_of(script, *arguments):
     return result.stdout.splitlines()
 
 
-def test_the_response_example_has_impacts_at_5_um_and_none_at_1_um():
+def test_the_response_example_has_impacts_at_5_um_and_no_impacts_at_1_um():
     weak, strong = lines_of("response_and_exponent.py")
     assert re.search(r"^1 µm: Response I [\d.]+, II [\d.]+, 0 impacts .* exponent -[\d.]+ ±", weak)
     assert int(re.search(r"(\d+) impacts", strong)[1]) > 0

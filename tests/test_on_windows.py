@@ -1,4 +1,4 @@
-"""Commands of a laboratory on Windows, run without the functions that Windows lacks."""
+"""Commands of a laboratory on Windows, run without the functions missing on Windows."""
 
 import json
 import subprocess
@@ -29,7 +29,7 @@ LOCKS = """
 from tests.windows_here import become_windows
 become_windows()
 from pathlib import Path
-from vibench.acquisition.bench.bench import BenchLock
+from vibench.acquisition.bench import BenchLock
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.recording._disk import PositionedFile, is_being_recorded
 from vibench.acquisition.rig import load_rig

@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 27_088,
-    "analysis": 33_575,
-    "cli": 5_084,
-    "extensions": 3_389,
-    "gui": 11_900,
-    "native": 6_837,
-    "sim": 20_551,
-    "studies": 3_125,
-    "virtual_rig": 6_535,
+    "acquisition": 26_705,
+    "analysis": 32_917,
+    "cli": 4_886,
+    "extensions": 3_354,
+    "gui": 11_808,
+    "native": 6_874,
+    "sim": 20_696,
+    "studies": 2_920,
+    "virtual_rig": 6_506,
 }
 """Lines of Python, stubs, templates and C++, without the C++ test program; their sum only decreases."""
 
@@ -40,7 +40,7 @@ NO_VERBS = {"A", "An", "Each", "Every", "If", "It", "No", "The", "There", "What"
         pytest.param(["lint-imports", "--no-cache"], id="imports-point-one-way"),
     ],
 )
-def test_linter_formatter_type_and_import_checks_pass(command):
+def test_the_checks_of_linter_formatter_types_and_imports_pass(command):
     result = subprocess.run(
         [str(TOOLS / command[0]), *command[1:]], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -118,4 +118,4 @@ def test_a_package_stays_within_its_line_budget(folder):
     ]
     lines = sum(path.read_text(encoding="utf-8").count("\n") for path in sources)
     assert 0 < lines <= LINES_AT_MOST[folder]
-    assert sum(LINES_AT_MOST.values()) <= 118_084
+    assert sum(LINES_AT_MOST.values()) <= 116_666

@@ -45,12 +45,21 @@ FOR_OUR_PROGRAMS = (
     "vibench.analysis.prediction",
 )
 ONE_FILE_ROOMS = (
+    "accuracy_benchmark",
     "background",
-    "errors",
-    "figure_choices",
-    "tables",
+    "bench",
     "command",
+    "comparison",
+    "engine_link",
+    "errors",
+    "first_day",
+    "hdf5_files",
+    "kinds",
+    "rig",
+    "spectra",
     "stop_files",
+    "tables",
+    "tones",
 )
 
 
@@ -190,6 +199,7 @@ def modules_loaded_by(program):
         ("from vibench.acquisition.engine import EngineClient", {"pyvisa", "nidaqmx", "grpc"}),
         ("from vibench.virtual_rig import plug_in_remote", {"nidaqmx"}),
         ("import vibench.cli", {"numpy", "typer"}),
+        ("import vibench.cli.measure", {"grpc", "scipy.linalg", "scipy.signal", "scipy.stats"}),
         (
             "import vibench.gui.window.window",
             {"pyvisa", "nidaqmx", "grpc", "scipy.signal", "scipy.stats"},

@@ -13,13 +13,11 @@ from vibench.sim.operating_system.this import replace_file
 
 SHEET = """
 from datetime import UTC, datetime
-from vibench.acquisition import save_toml
 from vibench.acquisition.rig import KnobSheet, save_knob_sheet
 def sheet(text): return KnobSheet(operator=text, confirmed=datetime.now(UTC), knobs=())
 """
 WRITERS = {
     "knobs": SHEET + "def write(path, text): save_knob_sheet(sheet(text), path)",
-    "toml": SHEET + "def write(path, text): save_toml(sheet(text), path)",
     "table": """
 from vibench.analysis.tables import Table, write_csv
 def write(path, text): write_csv(Table("table", ((text, (1.0,)),)), path)
@@ -41,10 +39,7 @@ print(path.read_bytes() == whole, [each.name for each in path.parent.iterdir()])
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits on file size exist on POSIX only")
-@pytest.mark.parametrize(
-    ("writer", "error"),
-    [("knobs", "ConfigurationError"), ("toml", "ConfigurationError"), ("table", "OSError")],
-)
+@pytest.mark.parametrize(("writer", "error"), [("knobs", "ConfigurationError"), ("table", "OSError")])
 def test_a_failed_write_leaves_the_existing_file_unchanged(tmp_path, writer, error):
     script = [sys.executable, "-c", WRITERS[writer] + REFUSED, str(tmp_path / "file")]
     ended = subprocess.run(script, capture_output=True, text=True, check=False)
@@ -82,8 +77,8 @@ UNFINISHED = {"coming", "unfinished", "tmp"}
 UNFINISHED_FOR_CALLER = {"_wav.py", "_csv.py", "_uff.py", "_mat.py", "_excerpt.py"}
 """Modules that write exports: `new_file` passes them the temporary name."""
 NO_FILE_OF_A_USER = {
-    "docs.py: shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)": "scratch",
-    "docs.py: shutil.copytree(root / 'site', target, ignore=shutil.ignore_patterns('.doctrees'), "
+    "installation.py: shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)": "scratch",
+    "installation.py: shutil.copytree(root / 'site', target, ignore=shutil.ignore_patterns('.doctrees'), "
     "dirs_exist_ok=True)": "a site is built again",
     "_log.py: path.open('a', encoding='utf-8')": "a log grows by whole lines",
     "_log.py: self._path.open('a', encoding='utf-8')": "likewise",

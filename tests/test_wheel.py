@@ -88,7 +88,7 @@ def users_folder(tmp_path):
 
 
 @pytest.mark.thorough
-def test_the_wheel_contains_types_templates_and_shipped_files(wheel):
+def test_the_wheel_contains_types_and_templates_and_shipped_files(wheel):
     names = set(ZipFile(wheel).namelist())
     for portion in PORTIONS:
         assert f"vibench/{portion}/py.typed" in names

@@ -1,4 +1,4 @@
-"""Run the Windows implementation on Linux, without the functions of Python that Windows lacks.
+"""Run the Windows implementation on Linux, without the functions of Python missing on Windows.
 
     python -m tests.windows_here measure campaign.toml --out recordings
 
@@ -73,7 +73,7 @@ sees_locks = pytest.mark.skipif(
 
 
 def become_windows() -> None:
-    """Replace the POSIX implementation, and remove the functions that Windows lacks."""
+    """Replace the POSIX implementation, and remove the functions missing on Windows."""
     sys.modules["vibench.sim.operating_system.posix"] = windows()
     for name in POSIX_ONLY:
         if hasattr(os, name):

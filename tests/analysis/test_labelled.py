@@ -15,13 +15,12 @@ from vibench import analysis
 from vibench.acquisition import open_recording
 from vibench.analysis import dynamics, hidden_motion, transmissibility
 from vibench.analysis.chaos.verdict import MotionVerdict
-from vibench.analysis.fit.parameters import FittedValue, Parameter
+from vibench.analysis.fit.lines import FittedValue, Parameter
 from vibench.analysis.fit.specimen_fit import SpecimenFit
 from vibench.analysis.fit.updated_specimen import UpdatedSpecimen
-from vibench.analysis.frequency_response.distortion import Distortion
-from vibench.analysis.kinds.analysis_kind import Result
-from vibench.analysis.overlay.measurement_prediction import MeasurementPrediction
-from vibench.analysis.overlay.overlay import AbstractOverlay
+from vibench.analysis.frequency_response.noise_response import Distortion
+from vibench.analysis.kinds import Result
+from vibench.analysis.overlay.overlay import AbstractOverlay, MeasurementPrediction
 from vibench.analysis.recordings.checks import AbstractAnalysis
 from vibench.analysis.results.compared_recording import ComparedRecording
 from vibench.analysis.sine.dwell_analysis import DwellMotion
@@ -88,7 +87,7 @@ class Whole(Tabular):
     nothing: None = None
 
 
-def test_nested_parts_keep_names_axes_and_units_in_a_dataset():
+def test_nested_parts_keep_their_names_axes_and_units_in_a_dataset():
     part = Part(np.arange(2.0), np.ones(2))
     data = Whole(np.arange(3.0), np.zeros((3, 6)), part, (part, part), "word", 45e-6).to_xarray()
     assert data["states"].dims == ("frequency_hz", "states_2")
@@ -163,10 +162,10 @@ covariance
 damping_ratio damping_ratios differs dimension dimension_high dimension_low distortion distortion_share
 down draws dropouts edge_samples ends error_estimate events exponent first first_sample half_width holdable
 impact_cell impacts index innovation_level is_colliding is_unexplained is_significant is_similar is_stable
-largest_multiplier left_out left_over level limit linear lines lines_used logarithm lost_samples
+is_unstable largest_multiplier left_out left_over level limit linear lines lines_used logarithm lost_samples
 multiplier multiplier_imaginary multiplier_real multiplier_u n_eff neighbour_correlation noise_bias_i
-noise_error_i noise_share order orders overlap overloaded_samples pairs period period_samples periods
-planned_stretches realisations reduced_chi_square reference_coherence relative relative_i relative_sd
+noise_error_i noise_share order orders overflows overlap overloaded_samples pairs period period_samples
+periods planned_stretches realisations reduced_chi_square reference_coherence relative relative_i relative_sd
 relative_sd_magnitude residue residue_acceleration response_i response_ii rest_bias_i rest_error_i restarts
 restitution runs
 sd_damping_ratio sd_exponent sd_response_ii sd_samples segment_samples segments_excluded segments_used
@@ -186,6 +185,7 @@ PURE_HERE = {
     *(f"Resonance.{name}" for name in ("peak_magnitude", "sd_peak_magnitude")),
     *(f"Jump.{name}" for name in ("before", "after")),
     *(f"MassCheck.{name}" for name in ("expected", "scale", "unexplained")),
+    "ChainRun.transmission_change",
     "DwellResponse.is_clear",
     "DwellResponse.slow_change",
     "SteppedResponse.slow_change",
@@ -376,7 +376,7 @@ def result(mean_m=2.0):
     return Measured(Spread(np.float64(mean_m), np.nan), np.array([95.0, 266.0]), None, pathlib.Path("here"))
 
 
-def test_a_json_document_has_all_fields_in_order_and_null_for_unknown():
+def test_a_json_document_has_all_fields_in_order_and_null_for_unknown_values():
     document = result().to_dict()
     assert list(document) == ["mean_m", "sd_m", "lowest_hz", "missing_m", "folder"]
     assert json.dumps(document, allow_nan=False) == (

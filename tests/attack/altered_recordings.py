@@ -20,8 +20,7 @@ import numpy as np
 
 from vibench.acquisition import load_toml, open_recording, shipped
 from vibench.acquisition.campaign import JournalPointState, ReasonCode
-from vibench.acquisition.campaign._bench_identity import BenchIdentity
-from vibench.acquisition.campaign._journal import Journal, journal_path
+from vibench.acquisition.campaign._journal import BenchIdentity, Journal, journal_path
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.recording import _seal
 from vibench.acquisition.rig import Rig

@@ -86,13 +86,9 @@ def serve() -> None:
     import vibench.analysis
     import vibench.cli.__main__
     import vibench.cli.analyse
-    import vibench.cli.catalogue
-    import vibench.cli.export
-    import vibench.cli.import_recording
+    import vibench.cli.files
     import vibench.cli.measure
-    import vibench.cli.recover
-    import vibench.cli.study
-    import vibench.cli.verify  # noqa: F401
+    import vibench.cli.predict  # noqa: F401
 
     for line in sys.stdin:
         asked = json.loads(line)

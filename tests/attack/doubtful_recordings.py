@@ -25,7 +25,7 @@ from .tally import Finding, Shard, Tally
 SURELY = 2.0
 """A finding exceeds twice its 95 % bound, which happens by chance once in 16,000."""
 STEADY = 2e-3
-"""Allowed variation of a drive, see `vibench.analysis.chaos.period`."""
+"""Allowed variation of a drive, see `vibench.analysis.chaos.verdict`."""
 Faults = tuple[str, ...]
 
 

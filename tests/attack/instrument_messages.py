@@ -41,7 +41,7 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def broken_scpi(chance: random.Random) -> bytes:
-    """Return one line for the generator; it may hold several commands, and may lack its end."""
+    """Return one line for the generator; it may contain several commands, and its end may be missing."""
     units = []
     for _ in range(chance.choice((1, 1, 1, 2, 5))):
         unit = chance.choice(COMMANDS)

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 
 from vibench.acquisition.recording._seal import write_seal
-from vibench.sim.hdf5_files.door import UnsafeHdf5
+from vibench.sim.hdf5_files import UnsafeHdf5
 
 from .byte_mutants import mutate_bytes
 from .command_attack import attack_commands

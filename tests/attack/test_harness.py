@@ -41,7 +41,7 @@ def test_every_violation_of_the_limits_is_a_fault(ending):
     assert len(ending.faults) == 1
 
 
-def test_a_mutant_depends_on_its_seed_and_number_only():
+def test_a_mutant_depends_only_on_its_seed_and_its_number():
     def mutants(shard):
         return {number: mutate_toml(CAMPAIGNS[0], chance) for number, chance in shard.chances(Tally("toml"))}
 

@@ -12,7 +12,7 @@ from vibench.acquisition.campaign import JournalPointState, read_journal
 
 from . import recordings_kills
 from .recordings_corpus import good_recordings
-from .recordings_kills import CALLS, FAULTS, LIBRARY, ROOT, WHEN, KilledCampaigns, at_the_end, build_library
+from .recordings_kills import CALLS, LIBRARY, ROOT, WHEN, KilledCampaigns, at_the_end, build_library
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux" or shutil.which("cc") is None, reason="preloads a C library"
@@ -98,7 +98,7 @@ from vibench.analysis.errors import InvalidRequest
 from vibench.sim.study import StudyError
 shim, before = ctypes.CDLL(os.environ[LIBRARY]), {path.name for path in folder.iterdir()}
 def code_of_write(number):
-    copy = shutil.copytree(folder, folder.with_name(f"copy-{number}"))
+    copy = shutil.copytree(folder, folder.with_name(f"copy-{when}-{number}"))
     shim.arm(call, number, when, fault, bytes(copy))
     try:
         write(copy)
@@ -108,11 +108,12 @@ def code_of_write(number):
     return 0
 assert code_of_write(1000) == 0
 count = 1000 - ctypes.c_int.in_dll(shim, "left").value
-for number in {1, count // 4, count // 2, 3 * count // 4, count - 1, count}:
-    child = os.fork()
-    if child == 0:
-        os._exit(code_of_write(number))
-    print(number, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+for when, fault in enumerate(FAULTS):
+    for number in {1, count // 4, count // 2, 3 * count // 4, count - 1, count}:
+        child = os.fork()
+        if child == 0:
+            os._exit(code_of_write(number))
+        print(when, number, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
 CATALOGUE = """
 from vibench.acquisition.campaign import list_recordings
@@ -127,9 +128,14 @@ def library(tmp_path_factory):
     return build_library(tmp_path_factory.mktemp("library"))
 
 
-def run_with_fault(library, code, folder, call, when, fault="ENOSPC"):
-    faults = {**FAULTS, "EINTR": errno.EINTR}
-    arguments = (folder, list(CALLS).index(call), WHEN.index(when), faults[fault])
+@pytest.fixture(scope="module")
+def runs(library):
+    with KilledCampaigns(library) as runs:
+        yield runs
+
+
+def run_with_fault(library, code, folder, call, when):
+    arguments = (folder, list(CALLS).index(call), WHEN.index(when), errno.ENOSPC)
     return subprocess.run(
         [sys.executable, "-c", ARMED + code, *map(str, arguments)],
         env={**os.environ, "LD_PRELOAD": str(library), LIBRARY: str(library)},
@@ -171,22 +177,20 @@ def test_a_result_is_reported_as_added_only_if_it_is_stored(library, tmp_path, w
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(
-    ("writer", "when", "fault"),
-    [
-        (writer, when, ("ENOSPC", "EINTR")[(row + column) % 2])
-        for row, writer in enumerate(HDF5_WRITERS)
-        for column, when in enumerate(WHEN)
-    ],
-)
-def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path, writer, when, fault):
+@pytest.mark.parametrize("writer", HDF5_WRITERS)
+def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path, writer):
+    """Each writer meets one error before, inside and after a write, and the next writer the other error."""
     folder = tmp_path / "folder"
     folder.mkdir()
     for name in ("cut_off.h5.part", "dwell.h5"):
         (folder / name).write_bytes(good_recordings()[name])
-    made = run_with_fault(library, HDF5_WRITERS[writer] + IN_FORKS, folder, "pwrite", when, fault)
+    errors = (errno.ENOSPC, errno.EINTR)
+    faults = [errors[(list(HDF5_WRITERS).index(writer) + column) % 2] for column in range(len(WHEN))]
+    code = f"FAULTS = {faults}\n{HDF5_WRITERS[writer]}{IN_FORKS}"
+    made = run_with_fault(library, code, folder, "pwrite", "before")
     assert made.stderr == ""
-    assert {line.split()[1] for line in made.stdout.splitlines()} == {"1"}, made.stdout
+    assert {line.split()[0] for line in made.stdout.splitlines()} == {"0", "1", "2"}
+    assert {line.split()[2] for line in made.stdout.splitlines()} == {"1"}, made.stdout
 
 
 @pytest.mark.thorough
@@ -249,27 +253,25 @@ def test_a_read_error_is_not_reported_as_damage(library, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("number", [1, 2, 3])
-def test_a_rename_that_succeeds_but_reports_an_error_does_not_end_the_campaign(library, tmp_path, number):
+def test_a_rename_that_succeeds_but_reports_an_error_does_not_end_the_campaign(runs, tmp_path, number):
     recordings_kills.write_campaign(tmp_path, "virtual_rig_streaming")
-    with KilledCampaigns(library) as runs:
-        run = runs.measure(tmp_path, kind="rename after ENOSPC", number=number)
+    run = runs.measure(tmp_path, kind="rename after ENOSPC", number=number)
     assert (run.code, run.err) == (0, "")
     assert at_the_end(tmp_path / "out", 2) == []
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("when", ["before", "after"])
-def test_a_point_recovered_after_a_journal_failure_is_not_repeated(library, tmp_path, when):
+def test_a_point_recovered_after_a_journal_failure_is_not_repeated(runs, tmp_path, when):
     recordings_kills.write_campaign(tmp_path, "virtual_rig_streaming")
     out = tmp_path / "out"
-    with KilledCampaigns(library) as runs:
-        refused = runs.measure(tmp_path, kind="ftruncate before ENOSPC", number=4)
-        assert "All committed samples are safe in out/weak.h5.part" in refused.err
-        # The seventh sync of a resume is the commit that would count the recovered recording.
-        refused = runs.measure(tmp_path, "--resume", kind=f"fsync {when} EIO", number=7)
-        assert "the journal out/killed.campaign.sqlite cannot be read or written" in refused.err
-        assert [path.name for path in out.glob("*.h5*")] == ["weak.h5"]
-        assert read_journal(out / "killed.campaign.sqlite")[0].state is JournalPointState.FAILED
-        resumed = runs.measure(tmp_path, "--resume")
+    refused = runs.measure(tmp_path, kind="ftruncate before ENOSPC", number=4)
+    assert "All committed samples are safe in out/weak.h5.part" in refused.err
+    # The seventh sync of a resume is the commit that would count the recovered recording.
+    refused = runs.measure(tmp_path, "--resume", kind=f"fsync {when} EIO", number=7)
+    assert "the journal out/killed.campaign.sqlite cannot be read or written" in refused.err
+    assert [path.name for path in out.glob("*.h5*")] == ["weak.h5"]
+    assert read_journal(out / "killed.campaign.sqlite")[0].state is JournalPointState.FAILED
+    resumed = runs.measure(tmp_path, "--resume")
     assert (resumed.code, resumed.err) == (0, "")
     assert at_the_end(out, 2) == []

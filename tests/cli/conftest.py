@@ -56,7 +56,7 @@ def vibench_here() -> Vibench:
             for name, value in {"COLUMNS": "200", **(environment or {})}.items():
                 patch.setenv(name, value)
             # A command with --json sets the console to standard error for its whole process.
-            patch.setattr(console, "_file", None)
+            patch.setattr(console, "stderr", False)
             with pytest.raises(SystemExit) as ended:
                 main()
         return subprocess.CompletedProcess(words, ended.value.code or 0, out.getvalue(), err.getvalue())

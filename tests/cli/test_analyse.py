@@ -45,7 +45,7 @@ def changed_copy(good, folder, change):
 
 
 @pytest.mark.thorough
-def test_options_for_estimator_quantity_and_resolution_are_applied_and_reported(vibench_here, good, tmp_path):
+def test_estimator_and_quantity_and_resolution_options_are_applied_and_reported(vibench_here, good, tmp_path):
     asked = ("--estimator", "h1", "--quantity", "velocity/acceleration", "--resolution", "5", "--scale", "db")
     done = vibench_here(
         "analyse", good, "--no-simulate", "--json", "--out", tmp_path / "out", *asked, cwd=tmp_path
@@ -141,7 +141,7 @@ def remove_plan(file):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (set_newer_version, "format version 99; this vibench reads version 1. Update"),
+        (set_newer_version, "format version 99; this version of vibench reads version 1."),
         (
             rename_channel,
             "no channel measures the motion of m0: the recording has drive_voltage, base_acceleration, laser",
@@ -158,7 +158,7 @@ def test_an_unreadable_recording_is_reported_with_its_fault(good, tmp_path, chan
 
 
 @pytest.mark.thorough
-def test_dead_clipped_or_lost_channels_are_named_in_a_readable_message(noise, tmp_path):
+def test_dead_or_clipped_or_lost_channels_are_named_in_a_readable_message(noise, tmp_path):
     plan, base, velocity, parts = noise
     dead = synthetic.write_recording(tmp_path, plan, base, 0 * velocity, parts, name="dead")
     assert "all samples of m0_velocity have the same value" in sentence(dead)

@@ -12,13 +12,13 @@ from typer.testing import CliRunner
 
 from tests.full_disk import full_disk
 from vibench.acquisition import CheckStopped, StopSwitch, stop_on_signal
-from vibench.acquisition.bench.instrument_list import InstrumentList
+from vibench.acquisition.bench import InstrumentList
 from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.first_day.configured import QUESTIONS, configure, value_in, with_answer
+from vibench.acquisition.first_day import QUESTIONS, configure, value_in, with_answer
 from vibench.acquisition.instruments import FoundDevice, _guarded
 from vibench.acquisition.rig import confirm_at_terminal, load_rig
 from vibench.cli.__main__ import app
-from vibench.cli.bench_new import _configure, _confirm_wire, _operator_at_terminal
+from vibench.cli.bench import _configure, _confirm_wire, _operator_at_terminal
 from vibench.sim import UnreadableTomlError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -79,7 +79,7 @@ def test_unconfirmed_wiring_ends_the_procedure_before_output(tmp_path):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("wired", ["false", '"no"', '" No "', '""'])
+@pytest.mark.parametrize("wired", ["false", '" No "', '""'])
 def test_a_missing_wire_ends_the_procedure(tmp_path, wired):
     done = begin_configuration(tmp_path, answers=f"wired = {wired}")
     assert done.exit_code == 1
@@ -108,7 +108,7 @@ def test_a_sensitivity_is_accepted_in_the_unit_of_its_certificate(tmp_path):
         assert part in told
 
 
-def test_a_number_without_unit_replaces_a_sensitivity_with_unit(tmp_path):
+def test_a_number_without_a_unit_replaces_a_sensitivity_with_a_unit(tmp_path):
     text = with_answer(LAB.read_text(encoding="utf-8"), SENSITIVITY, "100 mV/g", "note")
     assert value_in(text, SENSITIVITY) == '"100 mV/g"'
     assert value_in(with_answer(text, SENSITIVITY, "0.0102", "note"), SENSITIVITY) == "0.0102"
@@ -135,7 +135,7 @@ def test_ctrl_c_at_a_wiring_question_ends_the_procedure(monkeypatch):
     """The signal handler of a check would only request a stop, while the question would go on waiting."""
     monkeypatch.setattr("typer.confirm", lambda _: signal.raise_signal(signal.SIGINT))
     switch = StopSwitch()
-    with stop_on_signal(switch), pytest.raises(CheckStopped, match=r'before any output.*--bench "my own'):
+    with stop_on_signal(switch), pytest.raises(CheckStopped, match=r'signal was played.*--bench "my own'):
         _confirm_wire(Path("my own.toml"), "the T-piece")
     assert switch.request is None
 
@@ -152,7 +152,7 @@ def test_ctrl_c_at_a_question_ends_the_procedure_and_nothing_is_written(tmp_path
     assert not list(tmp_path.iterdir())
 
 
-def test_ctrl_c_at_a_knob_ends_the_procedure_before_output(monkeypatch):
+def test_ctrl_c_at_a_question_about_a_knob_ends_the_procedure_before_output(monkeypatch):
     def abort(_question):
         raise KeyboardInterrupt
 
@@ -160,12 +160,6 @@ def test_ctrl_c_at_a_knob_ends_the_procedure_before_output(monkeypatch):
     monkeypatch.setattr("builtins.input", abort)
     with pytest.raises(CheckStopped, match="nothing was energised"):
         confirm_at_terminal(())
-
-
-def test_a_question_is_repeated_after_a_number_too_large_to_use(tmp_path):
-    rig, wrong = answer_repeatedly(tmp_path, {"amplifier.gain_db": ["1e300", "3"]})
-    assert rig.amplifier.gain_db == 3.0
-    assert "amplifier.gain_db" in wrong[0]
 
 
 def test_a_configuration_that_cannot_be_written_completely_is_removed(tmp_path):
@@ -183,7 +177,7 @@ def test_a_target_that_is_not_a_folder_is_reported_before_any_question(tmp_path)
 
 
 @pytest.mark.thorough
-def test_a_wrong_gain_is_found_with_an_output_of_5_mv_and_nothing_larger(tmp_path):
+def test_a_wrong_gain_is_found_with_an_output_of_5_mv_and_no_larger_output(tmp_path):
     (tmp_path / "faults.toml").write_text(
         '[[faults]]\nat_s = 0.0\nfault = "turn_amplifier_gain"\ngain_db = 16\n'
     )
@@ -197,7 +191,7 @@ def test_a_wrong_gain_is_found_with_an_output_of_5_mv_and_nothing_larger(tmp_pat
     assert "two per cent" not in page
 
 
-def test_an_instrument_that_is_the_only_one_found_is_the_default_answer(tmp_path):
+def test_the_only_instrument_that_was_found_is_the_default_answer(tmp_path):
     pytest.importorskip("vibench_more_drivers", reason="pip install -e extensions/more_drivers brings it")
     only = found_instruments("USB0::2391::11271::MY5::0::INSTR")
     rig = configure(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
@@ -246,11 +240,11 @@ def answer_repeatedly(tmp_path, given):
 
 def test_a_question_is_repeated_immediately_after_a_wrong_answer(tmp_path):
     rig, wrong = answer_repeatedly(
-        tmp_path, {"amplifier.gain_db": ["ten", "700", "12"], "generator.settle_s": ["-1", "0.2"]}
+        tmp_path, {"amplifier.gain_db": ["ten", "700", "1e300", "12"], "generator.settle_s": ["-1", "0.2"]}
     )
     assert (rig.amplifier.gain_db, rig.generator.settle_s) == (12.0, 0.2)
-    assert len(wrong) == 3
-    for words in ("'ten' is not a number", "gain_db = 700", "settle_s = -1"):
+    assert len(wrong) == 4
+    for words in ("'ten' is not a number", "gain_db = 700", "gain_db = 1", "settle_s = -1"):
         assert any(words in each for each in wrong)
     assert load_rig(tmp_path / "lab.toml") == rig
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 WALKS = runpy.run_path(str(Path(__file__).parents[2] / "benchmarks" / "walks.py"))
-MOST_FRAMES, MOST_FILES, MOST_LOADED = 6, 40, 81
+MOST_FRAMES, MOST_FILES, MOST_LOADED = 6, 40, 66
 MOST_FRAMES_OF_A_BLOCK = 10
 
 

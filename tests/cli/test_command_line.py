@@ -6,11 +6,13 @@ import signal
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 from rich.progress import Progress
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
+from vibench.cli.__main__ import warning_line
 from vibench.cli.output import errors, words
 
 from .conftest import ENVIRONMENT, ROOT
@@ -49,7 +51,7 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
 
 
 @pytest.mark.thorough
-def test_the_commands_measure_export_and_pack_report_their_files_as_json(vibench_here, tmp_path):
+def test_the_json_output_of_measure_and_export_and_pack_lists_their_files(vibench_here, tmp_path):
     measured = vibench_here("measure", campaign(tmp_path), "--out", "recordings", "--json", cwd=tmp_path)
     (row,) = json.loads(measured.stdout)["recordings"]
     assert (row["name"], row["outcome"]) == ("dwell", "recorded")
@@ -163,7 +165,7 @@ def test_invalid_simulated_faults_are_refused_before_opening(refusal, tmp_path):
     assert "need a program that records" in served
     real = ROOT / "hardware_configs" / "lab_rig.toml"
     measured = refusal("measure", campaign(tmp_path), "--bench", real, "--faults", script, "--out", "out")
-    assert "is a real one" in measured
+    assert "is a real rig" in measured
     assert not (tmp_path / "out").exists()
 
 
@@ -241,7 +243,7 @@ def test_an_option_without_effect_is_refused(refusal, words, said):
     assert said in refusal(*words)
 
 
-def test_a_folder_given_as_path_of_the_page_is_refused_before_computation(refusal, tmp_path):
+def test_a_folder_given_as_the_path_of_the_page_is_refused_before_computation(refusal, tmp_path):
     (tmp_path / "pages").mkdir()
     said = refusal("reproduce", "--out", "new", "--markdown", "pages")
     assert "pages is a folder. Nothing was computed; give the name of a file" in said
@@ -285,6 +287,14 @@ def test_every_command_warns_if_a_value_in_micrometres_was_typed_as_metres(viben
     said = vibench_here(*words, *given[:2], *given[4:], cwd=tmp_path).stderr
     assert "warning: an amplitude of 5 m is 1.1e+05 times the gap" in said
     assert "if 5 micrometres were meant, give 5e-06" in said
+
+
+def test_a_warning_of_numpy_is_explained():
+    with np.errstate(over="warn"), pytest.warns(RuntimeWarning) as seen:
+        np.float64(1e300) * np.float64(1e300)
+    said = warning_line(seen[0].message)
+    assert said.startswith("warning: some numbers are too large or too small to compute with (overflow")
+    assert said.count("\n") == 1
 
 
 def test_a_map_warns_if_a_value_in_micrometres_was_typed_as_metres(vibench_here, tmp_path):

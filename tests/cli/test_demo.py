@@ -11,7 +11,7 @@ from tests.reading_reports import Page
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState, SegmentLabel
 from vibench.analysis import analyse
-from vibench.analysis.signals.confidence import phase_half_width
+from vibench.analysis.signals.averaging import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 LINEAR_HZ = (95.0, 266.0, 500.0)
@@ -49,7 +49,7 @@ def resonances_hz(result):
     return [found["frequency_hz"] for found in result["measured"]["resonances"]]
 
 
-def test_every_demo_measurement_is_complete_without_overload(demo, results):
+def test_every_demo_measurement_is_complete_and_without_overload(demo, results):
     assert set(results) == set(NAMES)
     for name in NAMES:
         with open_recording(demo / "recordings" / f"{name}.h5") as recording:
@@ -62,11 +62,11 @@ def test_weak_noise_shows_the_three_linear_resonances_within_1_percent(results):
     assert resonances_hz(results["noise_weak"]) == pytest.approx(LINEAR_HZ, rel=0.01)
 
 
-def test_strong_noise_shows_exactly_the_two_terminal_resonances(results):
+def test_strong_noise_shows_exactly_the_two_resonances_of_m1_joined_to_m2(results):
     assert resonances_hz(results["noise_strong"]) == pytest.approx(TERMINAL_HZ, rel=0.02)
 
 
-def test_pyuff_reads_response_coherence_and_densities_of_the_demo(demo, vibench_here, tmp_path):
+def test_pyuff_reads_the_response_the_coherence_and_the_densities_of_the_demo(demo, vibench_here, tmp_path):
     pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
     path = demo / "recordings" / "noise_weak.h5"
     asked = ("--to", "uff", "--spectra", "--quantity", "velocity/acceleration", "--out", "frf.uff")
@@ -177,8 +177,8 @@ def test_the_demo_report_begins_with_the_three_findings_of_the_paper(demo, resul
         " and ".join(", ".join(f"{each:.1f}" for each in resonances_hz(results[name])).rsplit(", ", 1))
         for name in ("noise_weak", "noise_strong")
     )
-    assert f"At 0.05 Vpp there are three resonances, {linear} Hz." in page.findings
-    assert f"At 10 Vpp they disappear, and two new ones appear at {terminal} Hz." in page.findings
+    assert f"At 0.05 Vpp there are three resonances, at {linear} Hz." in page.findings
+    assert f"At 10 Vpp these resonances disappear, and two new ones appear at {terminal} Hz." in page.findings
     assert results["dwell_moderate"]["measured"]["motion"]["kind"] == "chaotic"
     levels = {"dwell_weak": "0.05", "dwell_moderate": "1.5", "dwell_strong": "10"}
     kinds = {name: results[name]["measured"]["motion"]["kind"] for name in levels}

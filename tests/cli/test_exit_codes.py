@@ -52,7 +52,7 @@ def example_value(words):
 
 
 @pytest.mark.parametrize("words", [*NOT_ALLOWED, *NO_NUMBERS], ids=example_value)
-def test_every_command_exits_1_at_a_value_that_is_not_allowed(vibench_here, tmp_path, words):
+def test_every_command_exits_with_code_1_if_a_value_is_not_allowed(vibench_here, tmp_path, words):
     ran = vibench_here(*words, cwd=tmp_path)
     assert ran.returncode == 1, ran.stderr
     assert "rror: " in ran.stderr
@@ -60,17 +60,17 @@ def test_every_command_exits_1_at_a_value_that_is_not_allowed(vibench_here, tmp_
 
 
 @pytest.mark.parametrize("words", NOT_UNDERSTOOD, ids=example_value)
-def test_an_incomplete_or_unknown_command_line_exits_2(vibench_here, tmp_path, words):
+def test_an_incomplete_or_unknown_command_exits_with_code_2(vibench_here, tmp_path, words):
     assert vibench_here(*words, cwd=tmp_path).returncode == 2
 
 
-def test_a_second_path_is_refused_with_the_advice_to_give_only_one(vibench_here, tmp_path):
+def test_a_second_path_is_refused_with_the_advice_to_give_only_one_path(vibench_here, tmp_path):
     said = vibench_here("analyse", "a.h5", "b.h5", cwd=tmp_path).stderr
     assert "(b.h5); give one path, such as a folder" in " ".join(said.split())
 
 
 @pytest.mark.parametrize(("error", "remark"), [("0.1%", "needs about"), ("1e-6", "is not reachable")])
-def test_a_result_that_misses_the_requested_error_is_marked_and_the_command_exits_0(output_of, error, remark):
+def test_a_result_that_misses_the_target_error_is_marked_and_the_exit_code_is_0(output_of, error, remark):
     assert remark in output_of("predict", *SCENE, "--error", error, "--time", "1s")
 
 

@@ -199,7 +199,7 @@ def test_a_check_finds_a_converter_that_omits_samples(bench_with, tmp_path):
         return found(*given)
 
     path = bench_with("digitizer", FaultyDriver(DaqmxDigitizer, "read", skips))
-    with open_bench(path) as bench, pytest.raises(DataLost, match="instead of 0: it loses samples"):
+    with open_bench(path) as bench, pytest.raises(DataLost, match="instead of 0: the converter loses"):
         check_bench(bench, tmp_path)
 
 

@@ -31,7 +31,7 @@ def test_impossible_specimen_sizes_are_refused(tmp_path, option, value, told):
     ("option", "value", "said"),
     [
         ("--damping-time", "-1e-5", "a damping time of -1e-05 s is not allowed; give 0 to 0.01"),
-        ("--with", "fit=0", "an indentation of 0 m is not allowed; give a positive one"),
+        ("--with", "fit=0", "an indentation of 0 m is not allowed; give a positive length"),
     ],
 )
 def test_an_impossible_option_of_reproduce_is_refused_before_computation(

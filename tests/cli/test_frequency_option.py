@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.analysis import InvalidRequest
-from vibench.cli.range_option import frequencies
+from vibench.cli.scene_options import frequencies
 
 
 def test_a_number_is_one_frequency_and_a_range_includes_both_ends():
@@ -32,7 +32,7 @@ def test_a_number_is_one_frequency_and_a_range_includes_both_ends():
         ("", "'' is not a number", "one above 0 Hz"),
     ],
 )
-def test_an_invalid_frequency_list_is_refused_with_reason_and_remedy(typed, why, way):
+def test_an_invalid_frequency_list_is_refused_with_a_reason_and_a_remedy(typed, why, way):
     with pytest.raises(InvalidRequest) as refused:
         frequencies(typed)
     said = str(refused.value)

@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 
 from tests.full_disk import full_disk
 from vibench.acquisition import shipped_folder
-from vibench.acquisition.host.extras import EXTRAS
+from vibench.acquisition.host.installation import EXTRAS
 from vibench.cli.__main__ import COMMANDS
 from vibench.cli.doctor import VARIABLES, libraries
 from vibench.cli.output import ExitCode
@@ -68,7 +68,7 @@ def test_a_shipped_study_is_planned_by_name_from_an_empty_folder(output_of, tmp_
     assert not (tmp_path / "out.h5").exists()
 
 
-def test_copies_of_shipped_files_are_complete_and_never_overwrite(output_of, refusal, tmp_path):
+def test_copies_of_shipped_files_are_complete_and_never_overwrite_a_file(output_of, refusal, tmp_path):
     output_of("examples", "--copy", "mine")
     for folder in ("campaigns", "hardware_configs", "studies", "examples"):
         for path in shipped_folder(folder).rglob("*.toml"):
@@ -94,11 +94,14 @@ def test_shipped_studies_are_listed_as_toml_files(output_of):
 def test_a_full_disk_is_reported_in_one_sentence(refusal):
     with full_disk(room_bytes=100):
         said = refusal("examples", "--copy", "mine")
-    assert re.search(r"there is no space for .*ine/campaigns/branch\.toml", said)
+    with full_disk(room_bytes=17_000):
+        copied = refusal("docs", "--out", "site")
+    assert re.search(r"mine cannot be created as a folder: .* cannot be written to \(File too large\)", said)
+    assert re.search(r"there is no space for .*docs/.*; data written so far are kept", copied)
 
 
 @pytest.mark.thorough
-def test_doctor_shows_versions_folders_and_permissions_but_no_secrets(vibench_here, tmp_path):
+def test_the_doctor_shows_versions_and_folders_and_permissions_but_no_secrets(vibench_here, tmp_path):
     environment = {"VIBENCH_RIG_TOKEN": "do-not-tell", "VIBENCH_STATE_DIR": str(tmp_path / "state")}
     told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)
     sections = json.loads(told.stdout)
@@ -113,7 +116,7 @@ def test_doctor_shows_versions_folders_and_permissions_but_no_secrets(vibench_he
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("state", ["file", "file/below"])
-def test_the_doctor_reports_an_unwritable_state_folder_and_predictions_work(vibench_here, tmp_path, state):
+def test_the_doctor_reports_an_unwritable_state_folder_but_predictions_work(vibench_here, tmp_path, state):
     (tmp_path / "file").write_text("a file in the way")
     environment = {"VIBENCH_STATE_DIR": str(tmp_path / state)}
     told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)
@@ -137,7 +140,7 @@ def test_the_doctor_names_the_smallest_extra_that_contains_a_missing_library(mon
 
 @pytest.mark.parametrize(
     ("words", "completed"),
-    [("vibench pre", "predict"), ("vibench predict --ampl", "--amplitude"), ("vibench bench ch", "check")],
+    [("vibench predict --ampl", "--amplitude"), ("vibench bench ch", "check")],
 )
 def test_a_shell_completes_commands_and_their_options(vibench, tmp_path, words, completed):
     asked = {"_VIBENCH_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
@@ -226,7 +229,7 @@ def test_the_demo_names_the_missing_extra_before_it_begins(tmp_path, missing, ex
         ([*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], "from vibench.sim.maps import solve_map"),
     ],
 )
-def test_plans_recordings_and_analysis_need_neither_instruments_nor_the_window(left_out, imported):
+def test_plans_and_recordings_and_analysis_need_neither_instruments_nor_the_window(left_out, imported):
     program = (
         f"import sys\nfor library in {left_out!r}: sys.modules[library] = None\n"
         "from vibench.acquisition import load_campaign, open_recording, run_campaign\n"

@@ -37,7 +37,7 @@ RUN = RunStatus(
 SAID = "response_ii ± 2 % (goal: 1 %), about 12 s left"
 
 
-def test_the_terminal_shows_the_bound_its_target_and_the_time_left():
+def test_the_terminal_shows_the_bound_and_its_target_and_the_time_left():
     log = io.StringIO()
     status = EngineStatus(state=EngineState.RUNNING, attendance=Supervision.UNATTENDED, run=RUN)
     with engine_bars(Console(file=log, width=300, force_terminal=True)) as bars:

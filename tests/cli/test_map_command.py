@@ -48,7 +48,7 @@ def test_an_estimate_writes_no_file(output_of, tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("text", [MAP, DIAGRAM], ids=["map", "diagram"])
-def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(output_of, refusal, tmp_path, text):
+def test_a_map_is_saved_as_a_file_and_a_picture_and_can_be_resumed(output_of, refusal, tmp_path, text):
     asked = plan(tmp_path, text)
     told = output_of("map", asked, "--out", "a", "--json")
     assert told["is_complete"]
@@ -64,8 +64,9 @@ def test_a_map_is_saved_as_file_and_picture_and_can_be_resumed(output_of, refusa
     assert output_of("map", asked, "--out", "a", "--resume", "--json")["motions"] == told["motions"]
 
 
-def test_a_basin_map_reports_shares_and_kicks(output_of, tmp_path):
-    told = output_of("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "4", "--json")
+@pytest.mark.parametrize("more", ["", 'model = "rigid:0.8"\n'])
+def test_a_basin_map_reports_shares_and_kicks(output_of, tmp_path, more):
+    told = output_of("map", plan(tmp_path, BASIN + more), "--out", "a", "--kicks", "4", "--json")
     assert sum(each["share"] for each in told["motions"]) == pytest.approx(1.0)
     assert len(told["kicks"]) == 3 * len(told["motions"])
 
@@ -100,7 +101,8 @@ def test_a_basin_map_explains_a_missing_boundary_exponent(output_of, tmp_path, t
     ("text", "more", "said"),
     [
         (MAP, ("--show", "beauty"), "'beauty'; give one of response_i"),
-        (MAP, ("--kicks", "5"), "only the start varies"),
+        (MAP, ("--kicks", "5"), "only the initial state varies"),
+        (BASIN + "damping_time_s = 0\n", ("--kicks", "5"), "without damping, no motion returns"),
         (MAP, ("--show", "lyapunov"), "this map has observe = response; give observe = ["),
         (DIAGRAM.replace("120", "200"), (), "frequency_hz: a"),
         (DIAGRAM.replace("3 }", "1 }"), (), "map.toml: frequency_hz.points = 1: input should be greater"),
@@ -121,7 +123,7 @@ def test_an_invalid_map_causes_a_readable_message_but_no_folder(refusal, tmp_pat
     ("options", "told"),
     [
         (("--branches", "none.h5"), "none.h5"),
-        (("--kicks", "5"), "--kicks needs a map in which only the start varies"),
+        (("--kicks", "5"), "kicks need a map in which only the initial state varies"),
         (("--show", "lyapunov"), "--show lyapunov needs a map with exponents"),
     ],
 )

@@ -21,7 +21,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_options_take_help_and_default_from_their_request_fields(vibench_here, tmp_path, name):
+def test_options_take_their_help_and_their_default_from_fields_of_the_request(vibench_here, tmp_path, name):
     shown = " ".join(vibench_here(name, "--help", cwd=tmp_path).stdout.split())
     command = typer.main.get_command(COMMANDS[name].load())
     fields = {field for field, model in command.callback.fields.items() if model is MODELS[name]}

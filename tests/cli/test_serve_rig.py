@@ -61,7 +61,7 @@ def serve_rig_output():
 
 
 @pytest.mark.thorough
-def test_other_programs_can_use_generator_and_converter_of_the_served_rig(serve_rig_output):
+def test_other_programs_can_use_the_generator_and_the_converter_of_the_served_rig(serve_rig_output):
     address = serve_rig_output.split('insecure_channel("')[1].split('"')[0]
     stranger = subprocess.run(
         [sys.executable, "-c", PROGRAM, address], env=ENVIRONMENT, capture_output=True, text=True, check=False

@@ -91,7 +91,7 @@ def test_all_commands_agree_on_a_specimen_with_one_stop(vibench_here, tmp_path):
 
 
 @pytest.mark.parametrize("command", [("specimen",), ("chain", "--cells", 1, "--specimen")])
-def test_json_states_a_missing_stop_as_an_infinite_gap(output_of, tmp_path, command):
+def test_the_json_output_states_a_missing_stop_as_an_infinite_gap(output_of, tmp_path, command):
     document = output_of(*command, one_sided_specimen(tmp_path), "--json")
     described = document.get("options", {}).get("described", document)
     assert described["gap_m"] == [30e-6, "inf"]

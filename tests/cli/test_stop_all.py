@@ -51,7 +51,7 @@ def driving_program(what, *within):
             program.kill()
 
 
-def test_stop_without_a_name_stops_every_program(vibench_here, tmp_path):
+def test_the_stop_command_without_a_name_stops_every_program(vibench_here, tmp_path):
     with driving_program("north") as north, driving_program("south") as south:
         told = vibench_here("stop", "--level", "off", "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
@@ -60,7 +60,7 @@ def test_stop_without_a_name_stops_every_program(vibench_here, tmp_path):
             assert program.communicate(timeout=20)[0] == "off smoke\n"
 
 
-def test_stop_with_a_name_stops_only_that_program(vibench_here, tmp_path):
+def test_the_stop_command_with_a_name_stops_only_that_program(vibench_here, tmp_path):
     with driving_program("north") as north, driving_program("south") as south:
         assert vibench_here("stop", "--pid", north.pid, cwd=tmp_path).returncode == 0
         north.wait(20)
@@ -68,7 +68,7 @@ def test_stop_with_a_name_stops_only_that_program(vibench_here, tmp_path):
         assert south.poll() is None
 
 
-def test_a_hold_without_a_named_program_is_refused_if_several_run(vibench_here, tmp_path):
+def test_a_hold_without_a_named_program_is_refused_if_several_programs_run(vibench_here, tmp_path):
     with driving_program("north"), driving_program("south"):
         told = vibench_here("stop", "--level", "hold", cwd=tmp_path)
         assert told.returncode == 1
@@ -118,7 +118,7 @@ def on_another_computer(what):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
 def test_a_program_on_another_computer_is_reported_as_unreachable(vibench_here, tmp_path):
-    there = "Not reached because it runs on another computer: night (process"
+    there = "Programs on other computers were not reached: night (process"
     with on_another_computer("night") as path:
         alone = vibench_here("stop", cwd=tmp_path)
         assert alone.returncode == 1
@@ -129,7 +129,7 @@ def test_a_program_on_another_computer_is_reported_as_unreachable(vibench_here, 
         assert told.returncode == 0
         assert there in told.stdout
         assert "run 'vibench stop' there" in told.stdout
-    assert "Not reached" not in vibench_here("stop", cwd=tmp_path).stderr
+    assert "not reached" not in vibench_here("stop", cwd=tmp_path).stderr
     assert path.exists()
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import typer
 
-from vibench.cli.study import KeptStudies
+from vibench.cli.reproduce import KeptStudies
 from vibench.sim.study import PointState, Study, open_study
 
 from .conftest import ENVIRONMENT, ROOT
@@ -39,7 +39,7 @@ def plan(folder, text=SMALL):
     return path
 
 
-def test_an_estimate_counts_points_and_work_without_a_file(output_of, tmp_path):
+def test_an_estimate_counts_points_and_work_and_writes_no_file(output_of, tmp_path):
     told = {}
     for duration_s in (0.5, 5.0):
         asked = plan(tmp_path, SMALL.replace("duration_s = 0.5", f"duration_s = {duration_s}"))

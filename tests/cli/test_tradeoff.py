@@ -5,7 +5,7 @@ import time
 import pytest
 
 
-def test_the_tradeoff_of_a_scene_lists_the_chosen_and_all_other_methods(output_of, tmp_path):
+def test_the_tradeoff_of_a_scene_lists_the_chosen_method_and_all_other_methods(output_of, tmp_path):
     asked = ("tradeoff", "--amplitude", 5e-6, "--frequency", 100, "--model", "power:7", "--error", "0.1 %")
     points = output_of(*asked, "--json", "--out", tmp_path / "new")["points"]
     (chosen,) = [each for each in points if each["is_chosen"]]
@@ -25,6 +25,7 @@ def test_the_tradeoff_of_a_scene_lists_the_chosen_and_all_other_methods(output_o
         (("--frequency", 100), "a scene needs both --amplitude and --frequency"),
         (("--amplitude", -1, "--frequency", 100), "--amplitude was given as -1.0"),
         (("--amplitude", 5e-6, "--frequency", -1), "--frequency was given as -1.0"),
+        (("--amplitude", 5e-6, "--frequency", 0), "--frequency was given as 0.0"),
         (("--amplitude", 5e-6, "--frequency", 100, "--time", "soon"), "--time was given as 'soon'"),
     ],
 )
@@ -38,7 +39,7 @@ def test_an_impossible_scene_is_refused_with_a_readable_message(refusal, tmp_pat
     [(1e-4, 1000, "power:47", 0.0, 4.5e-5), (1e-9, 94.6, "linear", 1e-9, 1e-12)],
     ids=["chaos", "linear"],
 )
-def test_the_tradeoff_of_a_scene_ends_within_the_requested_time(output_of, scene):
+def test_the_tradeoff_computation_of_a_scene_ends_within_the_requested_time(output_of, scene):
     amplitude_m, frequency_hz, law, damping_s, gap_m = scene
     options = ("--model", law, "--damping-time", damping_s, "--gap", gap_m, "--time", "0.4s", "--json")
     asked = ("tradeoff", "--amplitude", amplitude_m, "--frequency", frequency_hz, *options)
@@ -50,7 +51,7 @@ def test_the_tradeoff_of_a_scene_ends_within_the_requested_time(output_of, scene
 
 
 @pytest.mark.thorough
-def test_tradeoff_without_a_scene_measures_the_four_cases_of_the_paper(output_of, tmp_path):
+def test_the_tradeoff_command_without_a_scene_measures_the_four_cases_of_the_paper(output_of, tmp_path):
     scenes = output_of("tradeoff", "--error", "10%", "--json", "--out", tmp_path / "new")["scenes"]
     assert [each["scene"] for each in scenes] == [f"hertz, 260 Hz, {um} µm" for um in (1, 5, 10, 50)]
     assert all(sum(point["is_chosen"] for point in each["points"]) == 1 for each in scenes)

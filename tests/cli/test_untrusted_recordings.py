@@ -65,7 +65,7 @@ def test_a_recording_swapped_for_another_is_refused_by_every_command(folder, how
     for command in (("verify", "dwell.h5"), ("analyse", "dwell.h5", "--no-simulate"), ("catalogue", ".")):
         code, text = run_reader(folder, *command)
         assert code == 1, text
-        assert "the campaign's journal for dwell: it is another recording" in text
+        assert "of dwell in the campaign's journal: it is another recording" in text
 
 
 @pytest.mark.thorough

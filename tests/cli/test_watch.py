@@ -86,7 +86,7 @@ def test_a_stop_of_a_stalled_engine_is_kept_and_reported(running, vibench, tmp_p
 
 
 @pytest.mark.thorough
-def test_watch_shows_the_run_and_its_end(running):
+def test_the_watch_command_shows_the_run_and_its_end(running):
     arguments = [sys.executable, "-m", "vibench.cli", "watch"]
     with subprocess.Popen(
         arguments, env={**os.environ, **OWN}, stdout=subprocess.PIPE, text=True
@@ -99,14 +99,14 @@ def test_watch_shows_the_run_and_its_end(running):
 
 
 @pytest.mark.thorough
-def test_watch_reports_that_no_engine_runs(vibench, tmp_path):
+def test_the_watch_command_reports_that_no_engine_runs(vibench, tmp_path):
     told = vibench("stop", cwd=tmp_path)
     assert told.returncode == 1
-    assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
+    assert "no engine is running; 'vibench measure' and 'vibench gui' start an engine" in told.stderr
     assert f"Only {os.environ['VIBENCH_STATE_DIR']} was searched" in told.stderr
 
 
-def test_watch_reports_an_unwritable_state_folder(vibench_here, tmp_path):
+def test_the_watch_command_reports_an_unwritable_state_folder(vibench_here, tmp_path):
     (tmp_path / "state").write_text("a file")
     told = vibench_here("stop", cwd=tmp_path, environment={"VIBENCH_STATE_DIR": str(tmp_path / "state")})
     assert told.returncode == 1
@@ -115,7 +115,7 @@ def test_watch_reports_an_unwritable_state_folder(vibench_here, tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")
-def test_the_token_is_readable_by_its_owner_only(tmp_path):
+def test_only_the_owner_can_read_the_token(tmp_path):
     state = Path(os.environ["VIBENCH_STATE_DIR"])
     with announce(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine", refuse_stop):
         (file,) = (state / "engines").iterdir()
@@ -175,7 +175,7 @@ class TestWithoutAnEngine:
         assert f"{script.pid} (alone) drives a bench without an engine" in watched.stderr
 
     @pytest.mark.thorough
-    def test_a_bench_check_is_stopped(self, vibench_here, tmp_path):
+    def test_the_stop_command_stops_a_bench_check(self, vibench_here, tmp_path):
         rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text().replace('"free"', '"wall"')
         (tmp_path / "wall.toml").write_text(rig)
         words = [sys.executable, "-m", "vibench.cli", "bench", "check", "--bench", "wall.toml"]

@@ -10,8 +10,7 @@ from PySide6.QtGui import QColor, QImage, QPainter
 
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.window.event_loop_monitor import BOUND_S
-from vibench.gui.window.open_window import application
-from vibench.gui.window.window import PAGES, Window
+from vibench.gui.window.window import PAGES, Window, application
 
 YARDSTICK_S = 0.0054
 """Time of `yardstick` [s] on the machine for which bounds are stated; bounds grow on slower processors."""

@@ -17,18 +17,20 @@ from PySide6.QtWidgets import (
     QProgressBar,
     QScrollArea,
     QTabWidget,
+    QWidget,
 )
 
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.widgets.notice import Notice, NoticeKind
 from vibench.gui.widgets.theme import Tone
 from vibench.gui.window.banner import StateIndicator, StatusField
-from vibench.gui.window.open_window import application
-from vibench.gui.window.window import PAGES, Window
+from vibench.gui.window.window import PAGES, Window, application
 
 SENTENCE = "Simulating; the first answer waits for the program to be made ready, and says so at length. " * 4
 NAME = "a_recording_whose_name_was_chosen_by_somebody_who_likes_to_say_everything_in_it_" * 2
 """A long word that cannot be wrapped."""
+SIZES = ((1024, 700), (1280, 720), (2560, 1440))
+"""Sizes of the window at which its usual texts are complete."""
 
 
 def fill_with_longest_texts(window):
@@ -139,6 +141,44 @@ def troubles_of(window, width, height, points):
     return found
 
 
+def cut_off(window):
+    for widget in window.findChildren(QWidget):
+        if not widget.isVisible() or not isinstance(widget, QAbstractButton | QLabel):
+            continue
+        if isinstance(widget, QLabel) and (widget.wordWrap() or widget.sizePolicy().horizontalPolicy() == 13):
+            continue
+        # qt_ objects belong to Qt's widgets; labels without text show nothing.
+        if widget.objectName().startswith("qt_") or not widget.text():
+            continue
+        if (
+            widget.width() < widget.minimumSizeHint().width()
+            or widget.height() < widget.minimumSizeHint().height()
+        ):
+            yield widget.text(), widget.size(), widget.minimumSizeHint()
+
+
+def scrolled_sideways(page):
+    """Return field columns that need horizontal scrolling; tables may scroll."""
+    for area in page.findChildren(QScrollArea):
+        if area.isVisible() and area.widget().minimumSizeHint().width() > area.viewport().width():
+            yield area.accessibleName(), area.widget().minimumSizeHint().width(), area.viewport().width()
+
+
+def cut_texts(window, width, height):
+    """Describe every text that is cut off on any page at a size, and columns that do not fit."""
+    window.resize(width, height)
+    found = []
+    for name, page in window.pages.items():
+        window.show_page(name)
+        QApplication.processEvents()
+        where = f"{name} at {width} x {height}"
+        if (window.width(), window.height()) != (width, height):
+            found.append(f"{where}: the page needs more room")
+        found += [f"{where}: {each} is cut off" for each in cut_off(window)]
+        found += [f"{where}: {each} needs sideways scrolling" for each in scrolled_sideways(page)]
+    return found
+
+
 def tabs_of(page):
     """Show each tab of a page in turn; yield its name."""
     tabs = next((each for each in page.findChildren(QTabWidget) if each.parent() is page), None)
@@ -159,8 +199,10 @@ def main(cases):
         window = Window(context, PAGES)
         window.show()
         app.processEvents()
+        window.setUpdatesEnabled(False)  # painting takes half the time and moves nothing
+        found = [each for size in SIZES for each in cut_texts(window, *size)]
         fill_with_longest_texts(window)
-        found = [each for case in cases for each in troubles_of(window, *case)]
+        found += [each for case in cases for each in troubles_of(window, *case)]
         window.close()
     print(json.dumps(found))  # noqa: T201 - output for the test
 

@@ -18,7 +18,7 @@ from vibench.acquisition.recording import REJECTED
 from vibench.analysis import analyse
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.page.user_actions import ABORT_KEY, OPERATOR_STOP
-from vibench.gui.pages.rig.rig_page import PACES
+from vibench.gui.pages.rig import PACES
 from vibench.gui.widgets.notice import COMPARE, FILES, RUN, TEST
 from vibench.gui.window.window import PAGES, Window
 

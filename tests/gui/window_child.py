@@ -9,8 +9,7 @@ from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineStat
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.gui.page.app_context import AppContext, Settings
-from vibench.gui.window.open_window import application
-from vibench.gui.window.window import PAGES, Window
+from vibench.gui.window.window import PAGES, Window, application
 
 DWELL = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 600}
 PLAN = {

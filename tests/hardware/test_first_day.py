@@ -15,7 +15,7 @@ import pytest
 
 from tests.changed import changed
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.bench import Verdict
 from vibench.acquisition.check.admission import check_bench
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.rig import KnobSheet, load_rig

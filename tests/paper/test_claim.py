@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.analysis import InvalidRequest, LogarithmOf
-from vibench.cli.paper.case import AS_CHOSEN, Case, change, damping
 from vibench.cli.paper.claim import Expectation, Verdict, about, at_least, at_most, claim, judgement
+from vibench.cli.paper.options import AS_CHOSEN, Case, change, damping
 from vibench.cli.paper.page import verdict_text
 from vibench.cli.paper.reading import Evidence
 
@@ -101,7 +101,7 @@ def test_a_measured_value_of_nan_meets_no_expectation():
 
 
 @given(low=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), value=st.floats(-2e6, 2e6))
-def test_the_bounds_of_an_expectation_include_their_ends(low, width, value):
+def test_an_expectation_is_met_at_and_between_its_bounds(low, width, value):
     wanted = make(no_studies, Expectation("anything", "", low, low + width))
     assert wanted.is_met_by((low,))
     assert wanted.is_met_by((low + width,))

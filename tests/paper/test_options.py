@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from vibench.analysis import InvalidRequest
-from vibench.cli.paper.case import CLOSEST, OPTIONS, Case, case_with, parse_option
 from vibench.cli.paper.claim import at_least, claim, costly_claim
 from vibench.cli.paper.collision_claims import sweep_of
-from vibench.cli.paper.options import FigureOptions
+from vibench.cli.paper.options import CLOSEST, OPTIONS, Case, case_with, parse_option
 from vibench.cli.paper.reading import Evidence, Reading
 from vibench.cli.paper.responses import Responses
 from vibench.cli.paper.settings import SETTINGS, claims_by_setting
@@ -24,7 +23,7 @@ NOTHING = Evidence(lambda study: pytest.fail(f"asked for {study}"))
 
 
 def case_for(*said, **options):
-    return case_with(FigureOptions(**options), said)
+    return case_with(Case(**options), said)
 
 
 def test_the_zeta_option_sets_the_damping_ratio_of_every_mass():

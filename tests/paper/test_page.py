@@ -7,10 +7,17 @@ import pytest
 
 from tests.reading_reports import Page
 from vibench.analysis.report import ReportTable, write_page
-from vibench.cli.paper.case import SCORED_S, Case, damping
 from vibench.cli.paper.claim import Verdict, at_least, claim, judgement
-from vibench.cli.paper.claims import CLAIMS, SECTIONS
-from vibench.cli.paper.page import HEAD, Reproduction, reproduction_document, reproduction_page, target_text
+from vibench.cli.paper.options import SCORED_S, Case, damping
+from vibench.cli.paper.page import (
+    CLAIMS,
+    HEAD,
+    SECTIONS,
+    Reproduction,
+    reproduction_document,
+    reproduction_page,
+    target_text,
+)
 from vibench.cli.paper.reading import Evidence
 from vibench.cli.paper.settings import DampingScore, score_figure, score_table
 
@@ -69,15 +76,15 @@ def test_the_claims_page_counts_verdicts_and_shows_values(found):
 
 def test_the_claims_page_lists_only_options_under_which_a_claim_holds(found):
     page = reproduction_document(found)
-    assert "It holds under c = 3e-05 s · k: exponent: 130 1/s." in page
+    assert "The claim holds under c = 3e-05 s · k. Exponent: 130 1/s." in page
     assert "exponent: 60 1/s" not in page
 
 
 def test_the_claims_page_begins_with_differences_and_agreeing_options(found):
     summary = reproduction_document(found).split("## ")[0]
     assert "**first**" not in summary
-    assert "- **second**: It is so with second. It holds under c = 3e-05 s · k: exponent: 130 1/s." in summary
-    assert "- **third**: It is so with third. It fails under all options tested (1)." in summary
+    assert "second**: It is so with second. The claim holds under c = 3e-05 s · k. Exponent: 130" in summary
+    assert "- **third**: It is so with third. The claim fails under all options (1)." in summary
 
 
 def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_number():
@@ -90,10 +97,10 @@ def test_an_option_that_holds_for_some_initial_states_is_listed_with_their_numbe
     page = reproduction_document(
         Reproduction({"Synthetic": (found,)}, score_rows(((), ("chance",))), (), "Defaults: these.", "")
     )
-    except_it = "; with c = 3e-05 s · k it holds for 3 of 4 starts"
-    assert f"It fails under all options tested (1){except_it}." in page
+    except_it = "; with c = 3e-05 s · k the claim holds for 3 of 4 starts"
+    assert "fails under all options (1). With c = 3e-05 s · k the claim holds for 3 of 4 starts." in page
     assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
-    assert "Values with c = 3e-05 s · k: exponent: 130 1/s (50 to 130); from 4 starts." in page
+    assert "4 starts. Exponent: 130 1/s (50 to 130); from 4 starts." in page
 
 
 def test_the_page_of_scores_names_the_best_damping_and_the_failed_claims(found):

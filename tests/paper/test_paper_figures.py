@@ -5,13 +5,14 @@ import pytest
 
 from vibench.analysis import InvalidRequest, LogarithmOf
 from vibench.analysis.report import ImageKind
-from vibench.cli.paper.figures import paper_figure
-from vibench.cli.paper.options import AMPLITUDES_M, FigureOptions
-from vibench.cli.paper.responses import responses, shade
+from vibench.cli.paper.drawing import shade
+from vibench.cli.paper.figures import FIGURES
+from vibench.cli.paper.options import AMPLITUDES_M, Case
+from vibench.cli.paper.responses import responses
 from vibench.sim import Accuracy
 from vibench.sim.study import solve_study
 
-SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=1.5, window_s=0.5)
+SHORT = Case(accuracy=Accuracy.QUICK, duration_s=1.5, window_s=0.5)
 """Long enough for the paper's peaks, far too short for its chaos."""
 
 
@@ -30,7 +31,7 @@ def solver():
 
 
 def draw(solver, number, options=SHORT):
-    figure = paper_figure(number)
+    figure = FIGURES[number]
     return figure.draw(options, *(solver(each) for each in figure.studies(options)))
 
 
@@ -54,7 +55,7 @@ def test_a_paper_figure_is_saved_in_every_format_with_its_table(solver, number, 
 
 
 @pytest.mark.thorough
-def test_figure_3_has_three_resonances_at_the_weak_level_and_two_others_at_the_strong_level(solver):
+def test_figure_3_has_three_resonances_at_the_weak_level_and_two_other_resonances_at_the_strong_level(solver):
     weak, *_, strong = draw(solver, 3).tables
     f = numbers(weak, "frequency_hz")
 
@@ -69,7 +70,7 @@ def test_figure_3_has_three_resonances_at_the_weak_level_and_two_others_at_the_s
 
 @pytest.mark.thorough
 def test_figure_3_shades_only_the_frequencies_with_collisions(solver):
-    results = solver(paper_figure(3).studies(SHORT)[0])
+    results = solver(FIGURES[3].studies(SHORT)[0])
     for amplitude_m, table in zip(AMPLITUDES_M, draw(solver, 3).tables, strict=True):
         curve = responses(results, amplitude=amplitude_m)
         assert np.array_equal(numbers(table, "collides") > 0, curve.collides)
@@ -109,9 +110,7 @@ def test_figure_7_has_the_rates_of_the_paper_at_the_weakest_level(solver):
 
 @pytest.mark.thorough
 def test_the_argument_of_the_logarithm_is_an_option_of_figure_7(solver):
-    other = FigureOptions(
-        accuracy=SHORT.accuracy, duration_s=1.5, window_s=0.5, logarithm_of=LogarithmOf.NORMALISED
-    )
+    other = Case(accuracy=SHORT.accuracy, duration_s=1.5, window_s=0.5, logarithm_of=LogarithmOf.NORMALISED)
     assert draw(solver, 7, other).caption != draw(solver, 7).caption
     assert draw(solver, 7, other).figure.axes[0].get_title() != draw(solver, 7).figure.axes[0].get_title()
 
@@ -119,4 +118,4 @@ def test_the_argument_of_the_logarithm_is_an_option_of_figure_7(solver):
 @pytest.mark.parametrize(("name", "value"), [("gap_m", 0.0), ("damping_time_s", -1.0), ("gap_m", np.nan)])
 def test_impossible_options_of_a_paper_figure_are_refused(name, value):
     with pytest.raises(InvalidRequest, match="not allowed"):
-        FigureOptions(**{name: value})
+        Case(**{name: value})

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.cli.paper.peaks import bound_peaks, linear_peaks, nearest, response_peaks, two_highest
+from vibench.cli.paper.responses import bound_peaks, linear_peaks, nearest, response_peaks, two_highest
 from vibench.sim import gong2025
 
 GRID = np.arange(5.0, 605.0, 5.0)

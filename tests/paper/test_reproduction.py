@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from vibench.cli.paper.case import SCORED_S, Case
 from vibench.cli.paper.claim import finding
-from vibench.cli.paper.claims import CLAIMS, SECTIONS
-from vibench.cli.paper.page import reproduction, reproduction_document
+from vibench.cli.paper.options import SCORED_S, Case
+from vibench.cli.paper.page import CLAIMS, SECTIONS, reproduction, reproduction_document
 from vibench.cli.paper.reading import Evidence
 from vibench.cli.paper.settings import score_figure, scores
 from vibench.sim import Accuracy

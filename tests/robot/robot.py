@@ -39,8 +39,7 @@ from vibench.acquisition.plan import Dwell, Measurement
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.plots.plot import Plot
 from vibench.gui.widgets.notice import TEST
-from vibench.gui.window.open_window import application
-from vibench.gui.window.window import PAGES, Window
+from vibench.gui.window.window import PAGES, Window, application
 
 from ..gui.forms.bad_values import BAD
 from ..gui.geometry import wrongly_enabled

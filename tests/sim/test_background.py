@@ -148,12 +148,12 @@ def leave(_number):
     os._exit(1)
 
 
-def test_a_callback_may_close_its_process_pool(pool):
+def test_a_callback_may_close_its_process_pool(patient_pool):
     errors = []
-    pool.ask(leave, errors.append, lambda error: (errors.append(error), pool.close()), 0)
-    poll_until(pool, lambda: errors)
+    patient_pool.ask(leave, errors.append, lambda error: (errors.append(error), patient_pool.close()), 0)
+    poll_until(patient_pool, lambda: errors)
     assert "has ended" in str(errors[0])
-    assert not pool.workers
-    assert pool.ask(factorial, errors.append, errors.append, 3).is_over
-    pool.poll()
+    assert not patient_pool.workers
+    assert patient_pool.ask(factorial, errors.append, errors.append, 3).is_over
+    patient_pool.poll()
     assert len(errors) == 1

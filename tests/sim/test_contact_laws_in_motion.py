@@ -85,7 +85,7 @@ def test_exchanging_unequal_stops_mirrors_the_motion(frequency_hz, amplitude_m, 
 
 @pytest.mark.parametrize("exponent", [3, 5, 7, 29, 47])
 def test_a_free_oscillator_with_a_power_law_has_its_closed_form_period(exponent):
-    # For the highest exponents the force at 40 um is weak: 5e-3 N for p^47, a period of 50 ms.
+    # For the highest exponents, the force at 40 um is weak: 5e-3 N for p^47, a period of 50 ms.
     specimen = colliding_pair(PowerLaw(46e-6, ((exponent, 5.0),)), faint=(1e-9, 2e-9, 3e-9))
     amplitude, force = 40e-6, 5.0
     m1, m2 = specimen.masses[1:]
@@ -107,16 +107,6 @@ def test_a_free_oscillator_with_a_power_law_has_its_closed_form_period(exponent)
     assert run.outcome is Outcome.REACHED_END
     assert p == pytest.approx(amplitude, rel=1e-7)
     assert abs(rate) < 1e-6 * speed
-
-
-@pytest.mark.parametrize("contact", ["power:3", "power:47"])
-def test_every_engine_gives_the_same_motion_without_drive(contact):
-    specimen, start = paper(contact), [0.0, 20e-6, -30e-6, 0.0, 0.0, 0.0]
-    harmonic = integrate(specimen, STILL, 0.01, Accuracy.REFERENCE, start)
-    sampled = integrate(specimen, Sampled(np.zeros(600), 51_200.0), 0.01, Accuracy.REFERENCE, start)
-    assert harmonic.outcome is sampled.outcome is Outcome.REACHED_END
-    assert distance(harmonic.final_state, sampled.final_state) < 1e-8
-    assert distance(harmonic.final_state, as_written(specimen, STILL, 0.01, start)) < 1e-6
 
 
 def test_a_linear_stop_gives_the_bilinear_frequency():
@@ -168,21 +158,13 @@ def test_a_sampled_sine_gives_the_same_motion_as_the_sine_under_any_contact_law(
     assert distance(sampled.final_state, harmonic.final_state) < 1e-5
 
 
-@pytest.mark.parametrize("contact", ["power:29", "power:47", "power:201"])
+@pytest.mark.parametrize("contact", ["power:47", "power:201"])
 @pytest.mark.parametrize("accuracy", list(Accuracy))
 def test_an_integration_step_that_goes_too_deep_into_a_steep_power_law_is_rejected(contact, accuracy):
     for drive in (Harmonic(260.0, 5e-6), Harmonic(430.0, 50e-6), Harmonic(210.0, 1e-3)):
         run = integrate(paper(contact), drive, 1.0, accuracy, sample_rate_hz=1e4)
         assert run.outcome is Outcome.REACHED_END
         assert np.max(np.abs(run.states[:, 1] - run.states[:, 2])) < 80e-6
-
-
-def test_a_negligible_contact_law_gives_the_linear_motion():
-    specimen = replace(gong2025(), contact=PowerLaw(46e-6, ((3, 1e-20),)))
-    start = np.array([1e-5, -2e-5, 1.5e-5, 0.01, -0.02, 0.03])
-    found = integrate(specimen, DRIVE, 0.1, Accuracy.REFERENCE, start, sample_rate_hz=1e4)
-    linear = integrate(gong2025(contact="linear"), DRIVE, 0.1, Accuracy.REFERENCE, start, sample_rate_hz=1e4)
-    assert max(map(distance, found.states, linear.states)) < 2e-11
 
 
 def test_very_soft_springs_do_not_reduce_accuracy():

@@ -1,6 +1,8 @@
 """Extreme parameters give a correct result or a refusal in one sentence, and never hang or give NaN."""
 
 import math
+import signal
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -21,9 +23,10 @@ from vibench.sim import (
     gong2025,
     integrate,
     lyapunov_exponent,
+    lyapunov_spectrum,
     steady_response,
 )
-from vibench.sim.chain import band_frequencies_hz, chain_of
+from vibench.sim.chain import band_frequencies_hz, chain_of, integrate_chain
 from vibench.sim.scene.shares import wilson_share
 
 pytestmark = pytest.mark.timeout(300)
@@ -84,17 +87,9 @@ def test_a_drive_of_one_picometre_gives_the_transmissibility(contact, frequency_
     assert response.relative_ii == pytest.approx(expected[3], rel=1e-5, abs=1e-11)
 
 
-@pytest.mark.parametrize("contact", STOPS)
-def test_a_gap_of_one_metre_is_never_closed(contact):
-    far, none = (integrate(one, DRIVE, 1.0) for one in (paper(contact, gap_m=1.0), paper("linear")))
-    assert far.impacts.count == 0
-    np.testing.assert_allclose(far.final_state, none.final_state, rtol=1e-12, atol=1e-18)
-
-
 @pytest.mark.parametrize("contact", SPRINGY)
-@pytest.mark.parametrize("gap_m", [1e-12, 1e-9])
-def test_the_smallest_gaps_agree_with_direct_integration(contact, gap_m):
-    specimen = paper(contact, gap_m=gap_m)
+def test_the_smallest_gaps_agree_with_direct_integration(contact):
+    specimen = paper(contact, gap_m=1e-12)
     ours = integrate(specimen, DRIVE, 0.003, Accuracy.REFERENCE)
     assert ours.outcome is Outcome.REACHED_END
     assert ours.impacts.count > 1
@@ -111,7 +106,7 @@ def test_motions_under_very_large_drives_agree_with_direct_integration(contact, 
     assert distance(ours.final_state, theirs) < 1e-6 * max(1.0, distance(theirs, 0.0))
 
 
-@pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("factor", [1e-6, 1e6])
 @pytest.mark.parametrize("contact", SPRINGY)
 def test_any_contact_stiffness_is_solved_within_its_accuracy(contact, factor):
     law = paper(contact).contact
@@ -150,7 +145,7 @@ def test_mass_ratios_of_a_million_agree_with_direct_integration(contact, factor,
 @pytest.mark.parametrize("place", [0, 1, 2])
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
 @pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.8", "rigid:1", "power:47"])
-def test_mass_ratios_of_a_million_with_other_laws_agree_between_accuracies(contact, factor, place):
+def test_mass_ratios_of_a_million_with_other_contact_laws_agree_between_accuracies(contact, factor, place):
     specimen = with_scaled_mass(paper(contact, gap_m=5e-6), place, factor)
     drive = Harmonic(430.0, 50e-6)
     finals = [
@@ -202,25 +197,8 @@ def test_a_pressed_contact_settles_at_its_static_indentation(contact):
     assert abs(run.final_state[4] - run.final_state[5]) < 1e-6
 
 
-@pytest.mark.parametrize("contact", ["rigid:0", "rigid:0.5", "rigid:1"])
-@pytest.mark.parametrize(("acceleration", "stays"), [(20.0, True), (17.0, False)])
-def test_m1_stays_on_a_rigid_stop_only_while_pressed_against_it(contact, acceleration, stays):
-    specimen, base, start = accelerated_specimen(contact, acceleration)
-    # Below k1 gap / m1 = 17.8 m/s^2 the spring lifts m1 off the stop.
-    threshold = specimen.stiffnesses[1] * specimen.gap_m / specimen.masses[1]
-    assert (acceleration > threshold) is stays
-    run = integrate(specimen, base, 0.05, Accuracy.REFERENCE, start, sample_rate_hz=1e4)
-    p, rate = run.states[:, 1] - run.states[:, 2], run.states[:, 4] - run.states[:, 5]
-    assert np.all(p >= -specimen.gap_m * (1.0 + 1e-9))
-    if stays:
-        assert np.all(rate == 0.0)
-        assert run.impacts.count == 0
-    else:
-        assert np.all(p[3:] > -specimen.gap_m)
-
-
 @pytest.mark.parametrize("duration_s", [10.0, pytest.param(1000.0, marks=pytest.mark.slow)])
-def test_elastic_impacts_on_rigid_stops_conserve_energy_however_many_they_are(duration_s):
+def test_any_number_of_elastic_impacts_on_rigid_stops_conserves_energy(duration_s):
     specimen = gong2025(damping_time_s=0.0, contact="rigid:1")
     start = np.array([2e-5, 0.0, -4e-5, 0.5, 0.25, -0.9])
     run = integrate(
@@ -256,7 +234,7 @@ def test_a_run_with_too_many_steps_ends_with_advice(contact, monkeypatch):
     assert integrate(specimen, DRIVE, 1.0).outcome is Outcome.REACHED_END
     run = integrate(specimen, DRIVE, 1000.0)
     assert run.outcome is Outcome.TOO_LONG
-    assert "run shorter" in run.outcome.text
+    assert "simulate less time" in run.outcome.text
     assert 1.0 < run.end_time_s < 1000.0
 
 
@@ -311,3 +289,30 @@ REFUSED = [
 def test_impossible_scenes_are_refused_with_a_readable_message(ask, sentence):
     with pytest.raises(ValueError, match=sentence):
         ask()
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timers of processor time")
+@pytest.mark.parametrize(
+    "long_run",
+    [
+        lambda: integrate(gong2025(), Harmonic(430.0, 50e-6), 1000.0),
+        lambda: integrate_chain(chain_of(gong2025(damping_time_s=1.0), 8), Harmonic(220.0, 2e-5), 1.0),
+        lambda: lyapunov_spectrum(gong2025(), Harmonic(430.0, 50e-6), "reference", 1000.0),
+    ],
+    ids=["specimen", "chain", "exponents"],
+)
+def test_a_signal_such_as_ctrl_c_ends_a_long_run_within_seconds(long_run):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGVTALRM, interrupt)
+    began_s = time.process_time()
+    try:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.5)
+        with pytest.raises(KeyboardInterrupt):
+            long_run()
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, before)
+    assert time.process_time() - began_s < 10.0

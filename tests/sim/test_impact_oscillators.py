@@ -197,10 +197,3 @@ def test_two_attractors_coexist_just_above_grazing(omega, chaotic, largest):
     assert quiet.exponent_per_s == pytest.approx(-0.01, abs=1e-6)
     orbit = integrate(*case, 10.0 * period, initial_state=quiet.final_state, sample_rate_hz=5000.0 / period)
     assert (orbit.states[:, 1] - orbit.states[:, 2]).max() == pytest.approx(largest, abs=1e-4)
-
-
-@pytest.mark.parametrize("omega", [0.72, 0.76])
-def test_below_grazing_the_exponent_of_the_soft_oscillator_is_the_decay_by_its_damper(omega):
-    found = exponent(soft(omega), omega, 500)
-    assert found.source is Source.MODES
-    assert found.exponent_per_s == pytest.approx(-0.01, rel=1e-7)

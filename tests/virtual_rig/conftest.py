@@ -13,7 +13,7 @@ from nidaqmx.constants import AcquisitionType
 from vibench.acquisition import ConfigurationError
 from vibench.virtual_rig.daqmx.rig import Pace
 from vibench.virtual_rig.daqmx.server import DaqServer
-from vibench.virtual_rig.world.wiring import Coupling, Input
+from vibench.virtual_rig.world.conversion import Coupling, Input
 
 OFFSET_V = 0.5
 LOOPED_BACK = {"Dev1/ai0": "Dev1/ao0", "Dev2/ai0": "Dev2/ao0"}

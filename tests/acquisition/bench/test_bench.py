@@ -1,6 +1,5 @@
 """Opening a bench opens all instruments or none; leaving it always silences the generator."""
 
-import itertools
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 
@@ -8,8 +7,9 @@ import numpy as np
 import pytest
 
 from tests.changed import changed
+from tests.small_rig import small_rig
 from vibench.acquisition import CheckFailed, InstrumentLost, open_bench
-from vibench.acquisition.bench.bench import BenchKind
+from vibench.acquisition.bench import BenchKind
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.rig import (
     CalibrationRule,
@@ -17,22 +17,16 @@ from vibench.acquisition.rig import (
     check_calibrations,
     confirm_by_sheet,
     confirm_simulated,
-    load_rig,
     save_knob_sheet,
 )
 from vibench.acquisition.rig._knobs import confirm_by_asking
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
-_serials = itertools.count(1)
-
 
 @pytest.fixture
 def rig():
-    """Return the virtual rig at a low sample rate, with a separate generator on the bus."""
-    rig = load_rig("virtual_rig")
-    resource = f"USB0::0x0699::0x0353::B{next(_serials):04d}::INSTR"
-    return changed(rig, daq={"sample_rate_hz": 5120}, generator={"resource": resource})
+    return small_rig()
 
 
 @pytest.fixture
@@ -141,7 +135,7 @@ class TestLeaving:
         assert caught.value is error
         assert output_of(virtual) == b"0\n"
 
-    def test_a_bench_whose_daq_server_died_is_silenced_and_its_failed_close_noted(self, laboratory, virtual):
+    def test_a_bench_whose_daq_server_died_is_silenced_and_a_failed_close_is_noted(self, laboratory, virtual):
         with pytest.raises(InstrumentLost) as caught:
             read_after_faults(laboratory, virtual.faults.lose_daq_server)
         assert str(caught.value).startswith("reading samples 0 to 511")
@@ -205,13 +199,13 @@ class TestKnobs:
         assert "2706: is the gain at 10 dB?" in asked[0]
         assert (sheet.operator, sheet.knobs) == ("B. Kjaer", rig.knobs)
 
-    def test_a_saved_knob_sheet_confirms_its_knobs(self, rig, tmp_path):
+    def test_a_saved_knob_sheet_confirms_the_knobs_that_it_lists(self, rig, tmp_path):
         path = tmp_path / "knobs.toml"
         sheet = confirm_by_asking(lambda _: "yes", 'O. "Quote" \\ Back\nslash')(rig.knobs)
         save_knob_sheet(sheet, path)
         assert confirm_by_sheet(path)(rig.knobs) == sheet
 
-    def test_a_knob_sheet_with_other_settings_is_refused(self, rig, tmp_path):
+    def test_a_knob_sheet_whose_settings_differ_from_the_rig_is_refused(self, rig, tmp_path):
         path = tmp_path / "knobs.toml"
         save_knob_sheet(confirm_simulated(rig.knobs), path)
         turned = changed(rig, amplifier={"gain_db": 20.0})
@@ -226,7 +220,7 @@ class TestKnobs:
         with pytest.raises(CheckFailed, match=r"it is valid for"):
             confirm_by_sheet(path)(rig.knobs)
 
-    def test_a_real_bench_without_an_operator_is_refused_with_the_list_of_its_knobs(self, laboratory):
+    def test_a_real_bench_without_an_operator_is_refused_with_a_list_of_the_knobs(self, laboratory):
         # pytest runs its tests without a terminal.
         with pytest.raises(CheckFailed, match=r"no one can answer here") as caught:
             open_bench(laboratory, calibration=CalibrationRule.WAIVED)

@@ -16,7 +16,7 @@ def virtual():
 
 
 @pytest.mark.thorough
-def test_generator_and_converter_are_listed_under_the_names_used_in_configurations(virtual):
+def test_the_generator_and_the_converter_are_listed_under_the_names_used_in_configurations(virtual):
     found = list_instruments(server=virtual.daq_address)
     assert any("1689::851::L0001" in resource for resource in found.visa_resources)
     module = next(device for device in found.daq_devices if device.name == "cDAQ1Mod1")

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from vibench.acquisition import open_bench
-from vibench.acquisition.bench.bench import BenchLock
+from vibench.acquisition.bench import BenchLock
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.rig import load_rig
 
@@ -65,7 +65,7 @@ def test_a_bench_that_another_user_drives_is_refused(user):
 
 @posix
 @pytest.mark.parametrize(("first", "second"), [(None, NOBODY), (NOBODY, None), (NOBODY, NOBODY - 1)])
-def test_a_second_program_is_refused_until_the_first_ends(user, first, second):
+def test_a_second_program_is_refused_until_the_first_program_ends(user, first, second):
     if os.geteuid() != 0:
         pytest.skip("only root can be another user")
     for one, other in ((first, second), (second, first)):
@@ -130,7 +130,7 @@ def test_a_foreign_file_in_place_of_a_lock_is_refused_and_kept(shared, tmp_path,
     assert aim.read_text() == "kept"
 
 
-def test_no_text_of_a_lock_file_except_its_process_number_is_shown(shared, monkeypatch):
+def test_only_the_process_number_in_a_lock_file_is_shown(shared, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(shared))
     with closing(BenchLock.of(RIG)):
         for path in shared.iterdir():

@@ -33,11 +33,18 @@ SWEEP = DWELL.model_copy(
 )
 
 
+@pytest.fixture(scope="module")
+def recorded(new_bench, rig, tmp_path_factory):
+    folder, bench = tmp_path_factory.mktemp("recorded"), new_bench(rig)
+    run_campaign(bench, Campaign(name="a", measurements=(DWELL,)), folder / "monday")
+    run_campaign(bench, Campaign(name="b", measurements=(SWEEP,)), folder / "tuesday" / "late")
+    return folder
+
+
 @pytest.fixture
-def folder(bench, tmp_path):
-    run_campaign(bench, Campaign(name="a", measurements=(DWELL,)), tmp_path / "monday")
-    run_campaign(bench, Campaign(name="b", measurements=(SWEEP,)), tmp_path / "tuesday" / "late")
-    return tmp_path
+def folder(recorded, tmp_path):
+    """Return copies of the recordings, with their file times, for one test to change."""
+    return shutil.copytree(recorded, tmp_path, dirs_exist_ok=True)
 
 
 @pytest.fixture
@@ -97,7 +104,7 @@ def test_a_lost_catalogue_is_rebuilt_from_the_files(folder, reads):
 
 
 @pytest.mark.thorough
-def test_the_verdict_on_a_recording_states_how_it_ended_and_any_overload(bench, folder):
+def test_the_verdict_on_a_recording_states_how_the_recording_ended_and_any_overload(bench, folder):
     loud = folder / "loud.h5"
     read = bench.digitizer.read
 
@@ -117,7 +124,7 @@ def test_the_verdict_on_a_recording_states_how_it_ended_and_any_overload(bench, 
 
 
 @pytest.mark.thorough
-def test_running_recordings_are_listed_and_abandoned_ones_are_marked_as_interrupted(bench, folder):
+def test_running_recordings_are_listed_and_abandoned_recordings_are_marked_as_interrupted(bench, folder):
     with Run(bench, DWELL, folder / "now.h5") as run:
         next(iter(run))
         running = next(entry for entry in list_recordings(folder) if entry.path == "now.h5.part")

@@ -76,9 +76,15 @@ DAMAGES = (
 
 @pytest.fixture(scope="module")
 def whole_folder(new_bench, rig, tmp_path_factory):
-    folder, bench = tmp_path_factory.mktemp("recorded"), new_bench(rig)
-    run_campaign(bench, CAMPAIGN, folder)
-    run_campaign(bench, CAMPAIGN, folder / "older")
+    folder, other, bench = (
+        tmp_path_factory.mktemp("recorded"),
+        tmp_path_factory.mktemp("other"),
+        new_bench(rig),
+    )
+    for each in (folder, other):
+        run_campaign(bench, CAMPAIGN, each)
+    (folder / "older").mkdir()
+    shutil.copy(other / "two.h5", folder / "older")
     return folder
 
 
@@ -96,6 +102,9 @@ def outcomes(point_results):
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_recording_is_reported_and_kept_and_its_point_is_measured_again(bench, folder, damage):
     damage(folder)
+    assert [each.path for each in verify_recordings(folder) if each.is_bad] == ["two.h5"]
+    planned = planned_recordings(CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert [each.is_complete for each in planned] == [True, False, True]
     left = (folder / "two.h5").read_bytes() if (folder / "two.h5").is_file() else None
     said = []
     made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, on_event=said.append)
@@ -142,7 +151,7 @@ def test_a_campaign_that_lost_its_journal_does_not_accept_damaged_recordings(ben
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, folder, has_journal):
+def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_the_check(bench, folder, has_journal):
     """The check of hundreds of recordings must notice a stop before it has read them all."""
     change_one_sample(folder)
     journal = folder / "c.campaign.sqlite"
@@ -155,22 +164,6 @@ def test_a_stop_ends_the_check_of_the_folder_and_a_resume_repeats_it(bench, fold
         assert [each.state for each in read_journal(journal)] == [JournalPointState.DONE] * 3
     made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("damage", [truncate, change_the_scale, copy_other_point, replace_by_a_folder])
-def test_the_list_of_planned_recordings_marks_damaged_ones_as_incomplete(folder, damage):
-    damage(folder)
-    planned = planned_recordings(CAMPAIGN, folder, ExistingRecordings.RESUME)
-    assert [each.is_complete for each in planned] == [True, False, True]
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_verifying_finds_every_kind_of_damage(folder, damage):
-    damage(folder)
-    bad = [each for each in verify_recordings(folder) if each.is_bad]
-    assert [each.path for each in bad] == ["two.h5"]
 
 
 @pytest.mark.parametrize("damage", [truncate, empty, fill_with_random_bytes, change_the_scale])
@@ -245,7 +238,7 @@ def test_every_seal_check_detects_a_swapped_recording(folder):
         for depth in SealDepth:
             found = recording.check_seal(depth)
             assert found.state is SealState.DAMAGED
-            assert found.sentence.endswith("the campaign's journal for two: it is another recording")
+            assert found.sentence.endswith("of two in the campaign's journal: it is another recording")
         assert not recording.is_checked
     assert [(each.path, each.verdict) for each in verify_recordings(folder) if each.is_bad] == [
         ("two.h5", "damaged")
@@ -266,7 +259,7 @@ def change_journal(statement):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("table", ["points", "attempts"])
-@pytest.mark.parametrize("seal", ["hex(zeroblob(32))", "(SELECT seal FROM points WHERE name = 'one')", "''"])
+@pytest.mark.parametrize("seal", ["(SELECT seal FROM points WHERE name = 'one')", "''"])
 def test_a_journal_with_two_different_seals_for_one_recording_is_reported_as_damage(folder, table, seal):
     list_recordings(folder)
     change_journal(f"UPDATE {table} SET seal = {seal} WHERE name = 'two'")(folder)
@@ -328,17 +321,17 @@ def test_a_pipe_in_place_of_a_journal_does_not_block(folder):
         read_journal(folder)
 
 
-def test_verifying_names_a_journal_that_cannot_be_read(folder):
+def test_the_verification_of_a_folder_names_a_journal_that_cannot_be_read(folder):
     change_journal("UPDATE points SET measurement_json = '{}'")(folder)
     bad = [each for each in verify_recordings(folder) if each.is_bad]
     assert [(each.path, each.verdict) for each in bad] == [("c.campaign.sqlite", "unreadable")]
 
 
 def test_verifying_an_emptied_folder_reports_missing_recordings(folder):
-    for path in (folder / "older").glob("*.h5"):
+    for path in folder.glob("*.h5"):
         path.unlink()
     bad = {each.path: each.verdict for each in verify_recordings(folder) if each.is_bad}
-    assert bad == dict.fromkeys(("older/one.h5", "older/two.h5", "older/three.h5"), "missing")
+    assert bad == dict.fromkeys(("one.h5", "two.h5", "three.h5"), "missing")
 
 
 @pytest.mark.thorough
@@ -363,7 +356,7 @@ def test_a_renamed_campaign_ignores_recordings_that_its_old_journal_rejects(benc
     assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
 
 
-def test_without_a_journal_recordings_of_another_bench_are_kept_only_with_consent(new_bench, rig, folder):
+def test_if_no_journal_exists_recordings_of_another_bench_are_kept_only_with_consent(new_bench, rig, folder):
     other = new_bench(rig.model_copy(update={"name": "another bench"}))
     with pytest.raises(CheckFailed, match=r"name was .* and is now 'another bench'"):
         run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME)
@@ -406,7 +399,7 @@ def test_a_stopped_recording_left_unfinished_on_disk_is_recovered_later(bench, t
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("has_journal", [True, False])
-def test_a_complete_recording_unfinished_on_disk_is_not_repeated(bench, tmp_path, has_journal):
+def test_a_complete_recording_whose_file_is_unfinished_is_not_repeated(bench, tmp_path, has_journal):
     run_until_disk_refuses(bench, tmp_path, None)
     if not has_journal:
         (tmp_path / "c.campaign.sqlite").unlink()

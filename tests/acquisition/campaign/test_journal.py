@@ -8,8 +8,7 @@ import pytest
 
 from vibench.acquisition import RecordingError
 from vibench.acquisition.campaign import JournalPointState, ReasonCode, list_recordings, read_journal
-from vibench.acquisition.campaign._bench_identity import BenchIdentity
-from vibench.acquisition.campaign._journal import Journal, journal_exists, journal_path
+from vibench.acquisition.campaign._journal import BenchIdentity, Journal, journal_exists, journal_path
 from vibench.acquisition.plan import Point
 
 from .small_campaigns import campaign, dwell
@@ -140,7 +139,7 @@ def open_and_close(path):
 @pytest.mark.parametrize(
     "use", [open_and_close, journal_exists, read_journal, lambda path: list_recordings(path.parent)]
 )
-def test_a_journal_or_catalogue_file_is_closed_after_it_was_refused(connections, tmp_path, use):
+def test_a_refused_journal_or_catalogue_file_is_closed(connections, tmp_path, use):
     path = tmp_path / "catalogue.sqlite"
     path.write_text("no database " * 100)
     with pytest.raises(RecordingError) as caught:
@@ -152,7 +151,7 @@ def test_a_journal_or_catalogue_file_is_closed_after_it_was_refused(connections,
             connection.execute("SELECT 1")
 
 
-def test_a_journal_that_already_exists_is_refused_and_its_connection_closed(journal, connections):
+def test_a_journal_that_already_exists_is_refused_and_the_connection_to_it_is_closed(journal, connections):
     with pytest.raises(RecordingError, match="already exists"):
         Journal.begin(journal.path, CAMPAIGN, journal.bench)
     (connection,) = connections

@@ -78,7 +78,7 @@ def test_a_missing_mail_server_is_reported_and_raises_no_exception(server, tmp_p
     assert MailMessenger(settings(tmp_path, port)).send(NOTICE).startswith("mail through 127.0.0.1 failed")
 
 
-def test_a_mail_server_that_lacks_the_requested_encryption_is_not_used(server, tmp_path):
+def test_a_mail_server_without_the_requested_encryption_is_not_used(server, tmp_path):
     said = MailMessenger(settings(tmp_path, server.server_address[1], "starttls")).send(NOTICE)
     assert said.startswith("mail through 127.0.0.1 failed")
     assert not any(line.startswith("Subject") for line in server.heard)

@@ -35,7 +35,7 @@ def test_a_file_with_the_name_of_the_campaign_folder_is_refused_before_output(be
 def test_limits_are_checked_once_for_points_with_equal_excitation(bench, tmp_path, monkeypatch):
     checked = []
     monkeypatch.setattr(
-        _opening, "require_within_limits", lambda measurement, rig: checked.append(measurement)
+        _opening, "require_within_limits", lambda measurement, rig: checked.append(measurement) or ()
     )
     repeated = CAMPAIGN.measurements[0].model_copy(update={"repeats": 3})
     planned = (repeated, CAMPAIGN.measurements[1], dwell("louder", amplitude_vpp=1.2))
@@ -70,7 +70,7 @@ def recordings(new_bench, rig, tmp_path_factory):
 
 
 @pytest.mark.thorough
-def test_progress_counts_the_recordings(recordings):
+def test_the_progress_of_a_campaign_counts_its_recordings(recordings):
     assert recordings[1] == {("one", 1, 3), ("two", 2, 3), ("three", 3, 3)}
 
 
@@ -130,7 +130,7 @@ def test_a_campaign_does_not_start_if_one_plan_exceeds_a_limit(bench, tmp_path):
 
 
 @pytest.mark.thorough
-def test_ctrl_c_ramps_down_the_measurement_and_ends_the_campaign(bench, tmp_path):
+def test_ctrl_c_ramps_down_the_drive_and_ends_the_campaign(bench, tmp_path):
     def press_once(progress):
         if progress.name == "two" and progress.run.state is RunState.SETTLING:
             signal.raise_signal(signal.SIGINT)

@@ -70,7 +70,7 @@ def outcomes(point_results):
 ALL = [(f"dwell-{name}", PointOutcome.RECORDED) for name in PLACES]
 
 
-def test_each_recording_of_a_scan_states_its_point_and_contains_the_motion_of_its_mass(kept, tmp_path):
+def test_each_scan_recording_states_its_point_and_contains_the_motion_of_a_mass_at_that_point(kept, tmp_path):
     world = kept._power._virtual.world
     world.keep_truth()
     velocities = {}
@@ -113,7 +113,7 @@ def test_the_seal_covers_the_scan_coordinates(kept, tmp_path):
 
 
 @pytest.mark.parametrize("journal", ["kept", "lost"])
-def test_a_scan_stopped_at_its_third_point_resumes_there(coarse, tmp_path, journal):
+def test_a_scan_stopped_at_its_third_point_resumes_at_that_point(coarse, tmp_path, journal):
     switch = StopSwitch()
 
     def stop_at_third_point(progress):

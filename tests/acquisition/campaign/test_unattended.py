@@ -43,7 +43,7 @@ class TestRetries:
         assert [point.attempts for point in points(tmp_path)] == [2, 1]
         assert [line["why"] for line in log(tmp_path) if line["event"] == "fault"] == ["data_lost"]
 
-    def test_faults_outside_the_retry_policy_are_not_retried(self, bench, tmp_path):
+    def test_a_measurement_is_not_repeated_after_a_fault_outside_the_retry_policy(self, bench, tmp_path):
         fault = fail_one_read(bench, DataLost("a hole"))
         with pytest.raises(DataLost):
             run_campaign(
@@ -54,7 +54,7 @@ class TestRetries:
         assert point.reason == "a hole"
 
     @pytest.mark.thorough
-    def test_a_campaign_reopens_its_bench_after_a_lost_instrument(self, bench, new_bench, rig, tmp_path):
+    def test_a_campaign_reopens_its_bench_after_an_instrument_was_lost(self, bench, new_bench, rig, tmp_path):
         opened = []
 
         def reopen():
@@ -130,7 +130,7 @@ class TestAnotherBench:
 
 class TestFurtherMeasurements:
     @pytest.mark.thorough
-    def test_follow_up_measurements_run_next_and_are_requested_once(self, bench, tmp_path):
+    def test_follow_up_measurements_are_requested_once_and_run_next(self, bench, tmp_path):
         asked = []
 
         def after(finished, recording):
@@ -208,7 +208,7 @@ class TestResuming:
 
 class TestWatching:
     @pytest.mark.thorough
-    def test_log_and_status_line_show_the_events_of_a_campaign(self, bench, tmp_path):
+    def test_the_log_and_the_status_line_show_the_events_of_a_campaign(self, bench, tmp_path):
         run_campaign(bench, campaign("one", "two"), tmp_path)
         of_points = ["point_begun", "point_done"]
         assert [line["event"] for line in log(tmp_path)] == ["begun", *of_points, *of_points, "ended"]
@@ -230,7 +230,7 @@ class TestWatching:
         assert json.loads(lines[1])["event"] == "begun"
 
     @pytest.mark.thorough
-    def test_a_notification_command_is_run_at_faults_and_at_the_end_and_may_fail(self, bench, tmp_path):
+    def test_a_notification_command_is_run_after_a_fault_and_at_the_end_and_may_fail(self, bench, tmp_path):
         told = tmp_path / "told.jsonl"
         keep = "import sys; open(sys.argv[1], 'a').write(sys.stdin.read() + chr(10))"
         messengers = (

@@ -1,23 +1,18 @@
 """A bench on simulated instruments that programs take for a real one, with faults on demand."""
 
-import itertools
 from contextlib import contextmanager
 
 import pytest
 
-from tests.changed import changed
+from tests.small_rig import small_rig
 from vibench.acquisition import open_bench
-from vibench.acquisition.rig import CalibrationRule, confirm_simulated, load_rig
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.virtual_rig import VirtualRig
-
-_serials = itertools.count(1)
 
 
 @pytest.fixture
 def rig():
-    rig = load_rig("virtual_rig")
-    resource = f"USB0::0x0699::0x0353::R{next(_serials):04d}::INSTR"
-    return changed(rig, daq={"sample_rate_hz": 5120}, generator={"resource": resource})
+    return small_rig()
 
 
 @contextmanager

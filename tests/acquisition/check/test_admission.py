@@ -19,7 +19,7 @@ from vibench.acquisition import (
     open_recording,
     run_measurement,
 )
-from vibench.acquisition.bench.result import rig_digest
+from vibench.acquisition.bench import rig_digest
 from vibench.acquisition.check.admission import archive_path, keep, require_fresh, why_not
 from vibench.acquisition.plan import Dwell, Measurement
 
@@ -70,7 +70,7 @@ def test_a_real_bench_whose_check_failed_or_is_old_is_not_armed(real, tmp_path, 
 
 
 @pytest.mark.parametrize("verdict", [Verdict.OK, Verdict.WARN])
-def test_a_recent_passed_check_is_not_repeated(real, tmp_path, verdict):
+def test_a_recently_passed_check_is_not_repeated(real, tmp_path, verdict):
     bench, virtual = real
     result = store_result(bench.rig, 11.9, verdict)
     before_s = virtual.world.time_s
@@ -117,7 +117,7 @@ def test_a_failed_new_check_is_stored_and_does_not_arm_the_bench(real, tmp_path)
 
 
 @pytest.mark.thorough
-def test_a_check_after_which_the_drive_stays_on_warns_about_the_output(real, tmp_path):
+def test_a_check_warns_about_the_output_if_the_drive_stays_on_afterwards(real, tmp_path):
     bench, virtual = real
     virtual.faults.stick_output()
     with pytest.raises(
@@ -144,13 +144,13 @@ def test_a_virtual_bench_is_checked_once_automatically(rig, state_folder, tmp_pa
 
 
 @pytest.mark.thorough
-def test_a_gain_change_since_the_last_check_is_reported_in_decibels_with_its_age_in_days(real, tmp_path):
+def test_a_gain_change_since_the_last_check_is_stated_in_decibels_with_the_number_of_days(real, tmp_path):
     bench, virtual = real
     check_bench(bench, tmp_path, lambda: NOW - timedelta(days=2))
     virtual.faults.turn_amplifier_gain(bench.rig.amplifier.gain_db - 0.8)
     result = check_bench(bench, tmp_path, lambda: NOW)
     drifted = result.report["amplifier gain since last time"]
-    assert drifted.value == "-0.80 dB since 2 days"
+    assert drifted.value == "-0.80 dB in 2 days"
     assert drifted.verdict is Verdict.WARN
     assert "look for a changed knob" in drifted.advice
     assert result.report["drive over setting since last time"].verdict is Verdict.OK
@@ -190,7 +190,7 @@ class TestKeeping:
         for _ in range(2):
             found = check_bench(bench, tmp_path)
             assert found.report[name].verdict is Verdict.FAIL
-            assert "as a new reference" in found.report[name].advice
+            assert "as the new reference" in found.report[name].advice
         meant = check_bench(bench, tmp_path, new_reference=True)
         assert meant.verdict is not Verdict.FAIL
         assert check_bench(bench, tmp_path).report[name].verdict is Verdict.OK

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import BenchReport, InstrumentLost, StopSwitch, Verdict, open_bench
-from vibench.acquisition.bench.result import Bounds
+from vibench.acquisition.bench import Bounds
 from vibench.acquisition.check.bench_report import bench_report
-from vibench.acquisition.check.loop import clock_ratio, fit_sine
+from vibench.acquisition.check.loop import clock_ratio
 from vibench.acquisition.errors import CheckStopped, InstrumentError, RunStalled
 from vibench.acquisition.rig import load_rig
+from vibench.acquisition.run.silence_watch import fit_sine
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
@@ -175,7 +176,7 @@ def test_a_converter_without_samples_ends_the_check_with_the_output_off(bench_of
 
 
 @pytest.mark.thorough
-def test_a_wrong_load_setting_that_cannot_be_read_is_found_with_advice(check_rig, rig, tmp_path):
+def test_a_wrong_load_setting_that_cannot_be_read_is_found_and_explained(check_rig, rig, tmp_path):
     assert failed_findings(check_rig(rig, tmp_path, quirks=Quirks(panel_load_ohm=inf))) == set()
     # The panel is set to 50 ohm: every amplitude is twice the setting.
     report = check_rig(rig, tmp_path, quirks=Quirks(panel_load_ohm=50.0))
@@ -230,7 +231,7 @@ def test_the_verdict_on_a_deviation_follows_from_its_bounds(deviation, verdict):
 
 
 class TestSineFit:
-    def test_amplitude_and_phase_of_a_pure_sine_are_exact(self):
+    def test_the_amplitude_and_the_phase_of_a_pure_sine_are_exact(self):
         time_s = np.arange(1000) / 5000.0
         fit = fit_sine(0.3 + 2.0 * np.cos(2 * np.pi * 160.0 * time_s + 0.7), 160.0, 5000.0)
         assert (fit.amplitude, fit.phase_rad) == pytest.approx((2.0, 0.7), rel=1e-12)

@@ -42,6 +42,6 @@ def test_a_signal_of_the_previous_run_that_decays_in_time_passes_the_check(check
 
 def test_an_interfering_source_is_found_before_output(check):
     with pytest.raises(
-        CheckFailed, match=r"the drive voltage shows 0\.005 V at 160 Hz before anything plays"
+        CheckFailed, match=r"the drive voltage shows 0\.005 V at 160 Hz before any signal is played"
     ):
         check(sine(HUM_V, 5120))

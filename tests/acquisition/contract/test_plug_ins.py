@@ -103,13 +103,13 @@ def test_an_exception_while_importing_a_plug_in_gives_a_one_sentence_error(tmp_p
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
-def test_two_plug_ins_with_one_name_are_refused(tmp_path, monkeypatch):
+def test_two_plug_ins_with_the_same_name_are_refused(tmp_path, monkeypatch):
     offer_generator(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
     with pytest.raises(ConfigurationError, match=r"provided twice \(somebody:Else, vibench"):
         plug_in(PlugInKind.GENERATOR, "afg1022x")
 
 
-def test_plug_ins_are_searched_once_per_module_search_path(tmp_path, monkeypatch):
+def test_plug_ins_are_searched_for_once_per_module_search_path(tmp_path, monkeypatch):
     looks = []
     monkeypatch.setattr(_guarded, "entry_points", lambda: looks.append("look") or EntryPoints())
     monkeypatch.syspath_prepend(tmp_path / "first")
@@ -165,7 +165,7 @@ def test_contract_tests_find_a_faulty_generator(tmp_path, installed):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ((), "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"),
+        ((), "--vibench-instrument NAME is missing; give the name of an entry point, such as afg1022x"),
         (
             ("--vibench-instrument=unknown",),
             "'unknown' is not an installed instrument; install its package first",

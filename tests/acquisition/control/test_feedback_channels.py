@@ -13,7 +13,7 @@ CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 0.0, 0.0, 10_240.0)
 
 @pytest.mark.parametrize("harmonic", [1, 2, 3, 4])
 @pytest.mark.parametrize("shift_rad", [0.0, 1.0, 2.5, -3.0])
-def test_a_harmonic_of_m0_is_measured_with_sinusoidal_base_motion(harmonic, shift_rad):
+def test_a_harmonic_of_the_motion_of_m0_is_measured_under_sinusoidal_base_motion(harmonic, shift_rad):
     """Base U sin(w t) and delayed m0 X sin(n w t - 1.2) give X/U exp(-1.2 i) for any time origin."""
     omega, order = 2 * np.pi * HERTZ, harmonic * 2 * np.pi * HERTZ
     base = np.full(8, -(omega**2) * 2e-4 * np.exp(1j * shift_rad))
@@ -50,7 +50,7 @@ def test_the_response_ratio_is_zero_if_the_base_does_not_move():
 
 
 @pytest.mark.parametrize("derivatives", [-1, 0, 1])
-def test_acceleration_displacement_and_velocity_of_m0_give_the_same_response_ratio(derivatives):
+def test_the_acceleration_the_displacement_and_the_velocity_of_m0_give_the_same_response_ratio(derivatives):
     """The velocity follows from a signal after `derivatives` differentiations."""
     channels = replace(CHANNELS, response_derivatives=derivatives, response_delay_s=0.0)
     orders_hz = HERTZ * np.arange(5)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from vibench.acquisition.excitation.plan import BaseLevel, JumpSearch, Settling
 from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import (
     Direction,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, LimitExceeded
-from vibench.acquisition.excitation.feedback import BaseLevel, Settling
+from vibench.acquisition.excitation.plan import BaseLevel, Settling
 from vibench.acquisition.plan import (
     CHECK_S,
     HeldDwell,
@@ -44,7 +44,7 @@ def run_of(bench, tmp_path, measurement=DWELL, check=LowLevelCheck.AT_LOW_LEVEL)
 
 
 @pytest.mark.parametrize("check", LowLevelCheck)
-def test_a_feedback_run_ends_in_silence_with_its_level_recorded(bench, tmp_path, check):
+def test_a_feedback_run_records_the_held_level_and_ends_in_silence(bench, tmp_path, check):
     states = {progress.state for progress in run_of(bench, tmp_path, check=check)}
     assert states >= {RunState.RAMPING_UP, RunState.SETTLING, RunState.RECORDING, RunState.RAMPING_DOWN}
     assert not bench.world.is_on

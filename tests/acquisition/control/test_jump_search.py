@@ -25,7 +25,7 @@ def search_jump(jump_hz, resolution_hz, before_hz=100.0, after_hz=110.0, height=
 
 
 @given(jump_hz=st.floats(100.01, 109.99), resolution_hz=st.floats(0.05, 4.0), height=st.floats(0.1, 0.6))
-def test_a_bracket_contains_its_jump_and_is_no_wider_than_requested(jump_hz, resolution_hz, height):
+def test_a_jump_bracket_contains_the_jump_and_is_no_wider_than_requested(jump_hz, resolution_hz, height):
     for ends in ((100.0, 110.0), (110.0, 100.0)):
         jump, asked = search_jump(jump_hz, resolution_hz, *ends, height)
         low, high = sorted((jump.before.frequency_hz, jump.after.frequency_hz))

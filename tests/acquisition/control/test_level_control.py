@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 from vibench.acquisition.control.control_action import MeasuredLevel, measured_level
 from vibench.acquisition.control.feedback_channels import feedback_channels_of
 from vibench.acquisition.control.sine_loop import SineLoop
-from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.excitation.plan import BaseLevel
 from vibench.acquisition.plan import HeldDwell, Measurement
 from vibench.acquisition.recording import Hold
 from vibench.acquisition.rig import channels_of

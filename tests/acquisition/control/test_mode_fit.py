@@ -23,7 +23,7 @@ def response_points(natural_hz, damping, count=7):
 
 @pytest.mark.parametrize(("natural_hz", "damping"), MODES)
 @pytest.mark.parametrize("turned", [0.0, 0.1])
-def test_frequency_and_damping_do_not_depend_on_sensor_phase(natural_hz, damping, turned):
+def test_frequency_and_damping_do_not_depend_on_the_phase_of_the_sensor(natural_hz, damping, turned):
     frequency_hz, answers = response_points(natural_hz, damping)
     found = fit_mode(frequency_hz, answers * np.exp(1j * turned))
     assert found.frequency_hz == pytest.approx(natural_hz, rel=1e-4)

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from vibench.acquisition import LimitExceeded, open_bench, open_recording, run_measurement
-from vibench.acquisition.excitation.held_noise import HeldNoise, SpectrumPoint, density_at
+from vibench.acquisition.excitation.noise import HeldNoise, SpectrumPoint, density_at
 from vibench.acquisition.plan import Measurement
 
 BAND = {"band_start_hz": 40, "band_stop_hz": 400, "repetition_hz": 2, "settle_s": 0.3}

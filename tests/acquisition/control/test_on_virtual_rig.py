@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from vibench.acquisition.excitation.plan import BaseLevel, JumpSearch, Settling
 from vibench.acquisition.plan import (
     Direction,
     HeldDwell,
@@ -15,7 +15,7 @@ from vibench.acquisition.plan import (
     RunState,
     SettledSine,
 )
-from vibench.acquisition.run.silence_watch import sine_amplitude
+from vibench.acquisition.run.silence_watch import fit_sine
 from vibench.sim import Harmonic, PhaseReference, gong2025, integrate, phase_resonance_branch
 
 SAMPLE_RATE_HZ = 10240.0
@@ -102,7 +102,7 @@ def test_the_base_level_is_held_despite_impact_ringing_on_a_light_table(record_r
     drive = recording.read("drive_voltage", dwell.first_sample, dwell.last_sample + 1)
     target = 5e-6 * (2 * np.pi * 260) ** 2
     # Fit at the frequency of the recorded drive: the clocks of generator and converter differ.
-    measured = sine_amplitude(base, true_frequency_hz(drive), SAMPLE_RATE_HZ)
+    measured = fit_sine(base, true_frequency_hz(drive), SAMPLE_RATE_HZ).amplitude
     assert abs(measured / target - 1) < 0.025
     # Impacts do ring: the remaining motion of the base is not small.
     assert np.var(base) - measured**2 / 2 > (0.1 * measured) ** 2 / 2
@@ -326,7 +326,7 @@ def test_no_subharmonic_is_found_in_a_motion_of_period_one(record_run, subharmon
 
 
 @pytest.mark.thorough
-def test_a_phase_search_ends_at_a_jump_of_the_motion_and_its_phase(record_run):
+def test_a_phase_search_ends_where_the_motion_and_its_phase_jump(record_run):
     """Below 197 Hz, m0's motion at half the drive is small, then jumps; bisection must not continue there."""
     plan = track_resonance(197, 24, low_hz=187, high_hz=199, subharmonic=2, most_tries=25)
     (found,) = notes_of(record_run(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")

@@ -68,7 +68,7 @@ def test_a_phase_error_beyond_90_degrees_does_not_count_as_a_resonance():
     assert found.half_width_hz == 0.0
 
 
-def test_the_slope_of_an_irregular_phase_is_taken_near_resonance():
+def test_the_slope_of_an_irregular_phase_is_computed_near_the_resonance():
     """The phase falls by 300 degrees per hertz at resonance, and hardly at all further off."""
     tries = [PhaseError(192 + 0.25 * n, 18.0 - n, 0.1) for n in range(4)]
     tries += [PhaseError(193.09 + off, -300.0 * off + 0.3, 0.1) for off in (-0.02, 0.01, 0.0)]

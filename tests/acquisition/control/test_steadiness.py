@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.acquisition.control.steadiness import in_drives, judgement_of
-from vibench.acquisition.excitation.feedback import Settling
+from vibench.acquisition.excitation.plan import Settling
 from vibench.acquisition.recording import Steadiness
 
 RULE = Settling()
@@ -29,7 +29,7 @@ def noise(count, share, seed=0):
 
 @settings(max_examples=30, deadline=None)
 @given(period=st.integers(1, 8), depth=st.floats(0.05, 0.5), seed=st.integers(0, 99))
-def test_a_motion_repeating_after_k_periods_has_period_k(period, depth, seed):
+def test_a_motion_that_repeats_after_k_periods_has_period_k(period, depth, seed):
     pattern = np.random.default_rng(seed).standard_normal(period)
     pattern[0] = np.abs(pattern).sum() + 3.0  # no shorter period, not even approximately by chance
     signal = points(300, (0, depth * np.resize(pattern, 300))) + noise(300, 1e-3)
@@ -96,7 +96,7 @@ def test_channel_noise_is_not_reported_as_chaos():
     assert found.noise == pytest.approx(0.05, rel=0.01)
 
 
-def test_the_stated_uncertainty_of_a_scatter_covers_its_variation_between_measurements():
+def test_the_stated_uncertainty_of_scatter_covers_how_the_scatter_varies_between_measurements():
     found = [judgement_of(points(81) + noise(81, 0.004, seed), Settling(periods=81)) for seed in range(300)]
     scatter = np.array([each.scatter for each in found])
     assert scatter.mean() == pytest.approx(0.004, rel=0.03)

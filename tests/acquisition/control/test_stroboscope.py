@@ -28,7 +28,7 @@ def test_the_drive_frequency_is_measured_relative_to_the_converter_clock(ppm):
     assert scope.clock.frequency_hz == pytest.approx(NEAR_HZ * (1 + 1e-6 * ppm), rel=1e-9)
 
 
-def test_amplitude_and_phase_of_motion_and_delayed_base_are_measured():
+def test_the_amplitude_and_the_phase_of_a_motion_and_of_a_delayed_base_are_measured():
     periods = observe(lambda angle: 3 * np.sin(angle)).periods()
     np.testing.assert_allclose(periods.response[:, 1], 3.0, atol=0.01)
     np.testing.assert_allclose(periods.response[FIRST_BLOCK:, 1], 3.0, atol=2e-4)
@@ -45,7 +45,7 @@ def test_the_mean_and_each_harmonic_are_measured_separately():
     np.testing.assert_allclose(np.abs(periods.response.mean(axis=0)), [0.7, 1, 0.3, 0, 0.1], atol=1e-4)
 
 
-def test_a_subharmonic_makes_successive_drive_periods_alternate():
+def test_a_subharmonic_makes_successive_drive_periods_differ():
     motion = observe(lambda a: np.sin(a) + 0.1 * np.sin(a / 2))
     response = motion.periods().response[FIRST_BLOCK:]
     np.testing.assert_allclose(response[2:], response[:-2], atol=2e-4)

@@ -1,5 +1,6 @@
 """The AFG1022 driver through the real pyvisa, on a simulated AFG1022 on a USB bus in memory."""
 
+import errno
 import math
 from dataclasses import replace
 
@@ -8,7 +9,7 @@ import pytest
 
 from vibench.acquisition import InstrumentError, InstrumentLost, LimitExceeded
 from vibench.acquisition.drivers import AFG1022X
-from vibench.acquisition.drivers._generator_limits import Shape
+from vibench.acquisition.drivers._limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
 from vibench.virtual_rig.generator.channel_output import OPEN_AMPLITUDE_RANGE_VPP, RunMode
@@ -22,7 +23,7 @@ def generator(plugged):
     opened = AFG1022X.open(plugged.config)
     plugged.log.forget()
     yield opened
-    plugged.usb.plug_cable()
+    plugged.usb.mend(errno.ENODEV)
     opened.close()
 
 
@@ -79,7 +80,7 @@ class TestOpening:
 
 
 class TestLoad:
-    def test_a_high_impedance_load_is_set_and_the_ohm_sign_in_its_reply_is_read(self, plugged, generator):
+    def test_a_high_impedance_load_is_set_and_the_ohm_sign_in_the_reply_is_read(self, plugged, generator):
         assert math.isinf(plugged.instrument.settings(1).declared_load_ohm)
         assert generator.unconfirmed == ()
 
@@ -91,7 +92,7 @@ class TestLoad:
 
     def test_a_wrong_load_set_on_the_panel_is_refused_with_advice(self, panel_load):
         with pytest.raises(
-            SettingRefused, match=r"set to a load of 50 ohm.*factor of two.*high-z on its panel"
+            SettingRefused, match=r"set to a load of 50 ohm.*factor of two.*high-z on the generator's panel"
         ):
             AFG1022X.open(panel_load.config)
         assert not panel_load.is_on
@@ -183,7 +184,7 @@ class TestPlaying:
         ]
         assert max(heard) == pytest.approx(OPEN_AMPLITUDE_RANGE_VPP[0])
 
-    def test_a_burst_is_set_to_its_number_of_cycles_and_can_be_ended(self, plugged, generator):
+    def test_a_burst_is_set_to_the_requested_number_of_cycles_and_can_be_ended(self, plugged, generator):
         generator.load_sine(100.0, 1.0)
         generator.arm_burst(7)
         state = plugged.instrument.settings(1)
@@ -239,10 +240,10 @@ class TestLimits:
 
 
 class TestFaults:
-    def test_a_setting_that_the_instrument_replaces_silences_the_output_with_an_error(self, plugged, playing):
+    def test_the_output_is_silenced_with_an_error_if_an_instrument_replaces_a_setting(self, plugged, playing):
         # At a load of 10 ohm, set at the panel, 10 Vpp is out of range and silently becomes 1 Vpp.
         plugged.instrument.execute(b"OUTP1:IMP 10")
-        with pytest.raises(SettingRefused, match=r"10\.0000VPP.*reads back '1") as caught:
+        with pytest.raises(SettingRefused, match=r"10\.0000VPP, but '1.* was read back") as caught:
             playing.set_amplitude(10.0)
         assert not plugged.is_on
         assert "The output was switched off." in caught.value.__notes__
@@ -295,12 +296,12 @@ class TestFaults:
         assert plugged.instrument.settings(1).frequency_hz == 262.0
 
     @pytest.mark.parametrize("act", [lambda generator: generator.set_amplitude(0.2), AFG1022X.close])
-    def test_losing_a_generator_gives_advice_and_it_can_be_stopped_later(self, plugged, playing, act):
-        plugged.usb.pull_cable()
+    def test_a_lost_generator_is_reported_with_advice_and_can_be_stopped_later(self, plugged, playing, act):
+        plugged.usb.fail(errno.ENODEV)
         with pytest.raises(InstrumentLost, match=r"MAY STILL BE ON.*Turn the amplifier"):
             act(playing)
         assert plugged.is_on
-        plugged.usb.plug_cable()
+        plugged.usb.mend(errno.ENODEV)
         playing.stop()
         assert not plugged.is_on
 

@@ -83,7 +83,7 @@ class TestReading:
         assert digitizer.identity.firmware.startswith("NI-DAQmx ")
         assert digitizer.roles == ("drive_voltage", "amplifier_voltage", "base_acceleration", "m0_velocity")
 
-    def test_the_reported_sample_rate_is_that_used_by_the_hardware(self, rig, open_digitizer):
+    def test_the_reported_sample_rate_is_the_rate_that_the_hardware_uses(self, rig, open_digitizer):
         digitizer = open_digitizer(with_daq(rig, sample_rate_hz=10_000))
         assert digitizer.sample_rate_hz == pytest.approx(10_240.0)
 
@@ -111,7 +111,7 @@ class TestReading:
         assert not np.shares_memory(first.volts, second.volts)
         assert np.array_equal(first.volts, kept)
 
-    def test_an_input_beyond_its_range_is_flagged_with_its_sample_range(self, rig, virtual, open_digitizer):
+    def test_an_input_beyond_its_range_is_flagged_at_the_affected_samples(self, rig, virtual, open_digitizer):
         # A configured range of 1 V, while the device measures with its range of 5 V.
         digitizer = open_digitizer(with_channel(rig, 0, range_v=1.0))
         virtual.generator.execute(b"SOUR1:FREQ 100;:SOUR1:VOLT 8VPP;:OUTP1 ON")
@@ -153,9 +153,9 @@ class TestConfiguration:
             (lambda rig: with_daq(rig, device="Dev9"), r"no device with this name"),
             (lambda rig: with_daq(rig, product="USB-6211"), r"is a NI 9234"),
             (lambda rig: with_channel(rig, 0, physical="ai7"), r"no such channel"),
-            (lambda rig: with_channel(rig, 0, range_v=50.0), r"does not support"),
-            (lambda rig: with_channel(rig, 2, iepe_current_a=0.5), r"does not support"),
-            (lambda rig: with_daq(rig, sample_rate_hz=1e6), r"does not support"),
+            (lambda rig: with_channel(rig, 0, range_v=50.0), r"is not supported"),
+            (lambda rig: with_channel(rig, 2, iepe_current_a=0.5), r"is not supported"),
+            (lambda rig: with_daq(rig, sample_rate_hz=1e6), r"is not supported"),
         ],
     )
     def test_unsupported_settings_are_reported_when_the_bench_opens(self, rig, change, complaint):
@@ -229,7 +229,7 @@ class TestErrors:
         assert f"({code.name}, {code.value}: said" in str(error)
         assert "To do: " in str(error)
 
-    def test_a_daqmx_error_outside_the_table_keeps_number_and_text(self):
+    def test_a_daqmx_error_outside_the_table_keeps_its_number_and_its_text(self):
         error = from_code(DaqError("Something rare", -200001), "reading Dev1")
         assert "Something rare" in str(error)
         assert "-200001" in str(error)

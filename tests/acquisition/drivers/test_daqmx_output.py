@@ -86,7 +86,7 @@ def test_a_stream_is_played_from_its_first_sample_without_gaps(digitizer, output
     assert np.max(np.abs(drive_v[late] - basis @ fitted)) < NOISE_V
 
 
-def test_an_output_underflow_is_reported_as_lost_data_and_ends_at_zero(digitizer, output):
+def test_an_output_underflow_is_reported_as_lost_data_and_the_output_ends_at_zero(digitizer, output):
     output.write(np.full(1280, 1.0))
     output.arm()
     digitizer.start()
@@ -141,7 +141,7 @@ def test_a_stopped_output_streams_again_from_sample_0(digitizer, output):
         np.testing.assert_allclose(heard[delay + 256 :], expected[256:], atol=0.03 * amplitude_v)
 
 
-def test_opening_sets_an_output_that_another_program_left_high_to_zero(digitizer, virtual):
+def test_an_output_that_another_program_left_high_is_set_to_zero_when_it_is_opened(digitizer, virtual):
     virtual.world.play("Dev1/ao0", np.full(51_200, 1.0), 51_200.0)
     digitizer.start()
     open_output(digitizer).close()
@@ -165,8 +165,8 @@ def test_the_output_is_refused_and_released_if_it_would_change_the_requested_rat
     [
         ("Dev1/ao7", {}, ConfigurationError, r"Dev1/ao7 .*no such channel"),
         ("Dev9/ao0", {}, ConfigurationError, r"Dev9/ao0 .*no device with this name"),
-        ("Dev1/ao0", {"limit_v": 5.0}, ConfigurationError, r"not support .*range.*-3\.5 to 3\.5 V"),
-        ("Dev1/ao0", {"sample_rate_hz": 2e5}, ConfigurationError, r"not support a rate.*1000 to 96000"),
+        ("Dev1/ao0", {"limit_v": 5.0}, ConfigurationError, r"range.* not supported .*-3\.5 to 3\.5 V"),
+        ("Dev1/ao0", {"sample_rate_hz": 2e5}, ConfigurationError, r"the requested rate.*1000 to 96000"),
     ],
 )
 def test_an_unsupported_setting_is_refused_with_a_readable_message(digitizer, physical, changes, kind, said):

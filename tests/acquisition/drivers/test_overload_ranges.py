@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import Overload
-from vibench.acquisition.drivers._overload import overload_ranges
+from vibench.acquisition.drivers._limits import overload_ranges
 
 
 def ranges_of(row, first_sample=0, full_scale_v=1.0):

@@ -79,7 +79,7 @@ def test_an_endless_error_queue_raises_an_error():
 
 
 @pytest.mark.parametrize("reply", [b"\n", b"volts\n", b"\xff\xfe\n"])
-def test_a_non_numeric_answer_raises_an_error_with_query_and_answer(reply):
+def test_a_non_numeric_answer_raises_an_error_that_quotes_the_query_and_the_answer(reply):
     instrument = Instrument()
     instrument.answers["FREQ?"] = [reply]
     with pytest.raises(InstrumentError, match=r"FREQ\?.*not a number"):

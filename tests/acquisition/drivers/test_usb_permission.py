@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import shipped
-from vibench.acquisition.drivers import _visa_link
+from vibench.acquisition.drivers import _scpi
 from vibench.acquisition.errors import InstrumentLost
 
 AFG = "USB0::0x0699::0x0353::C010101::INSTR"
@@ -12,8 +12,8 @@ AFG = "USB0::0x0699::0x0353::C010101::INSTR"
 @pytest.fixture
 def bus(tmp_path, monkeypatch):
     """Return a function that puts one device on a USB bus, with or without write permission."""
-    monkeypatch.setattr(_visa_link, "USB_DEVICES", tmp_path / "devices")
-    monkeypatch.setattr(_visa_link, "USB_NODES", tmp_path / "nodes")
+    monkeypatch.setattr(_scpi, "USB_DEVICES", tmp_path / "devices")
+    monkeypatch.setattr(_scpi, "USB_NODES", tmp_path / "nodes")
 
     def plug_device(vendor, product, may_write):
         device = tmp_path / "devices" / "1-2"
@@ -42,6 +42,6 @@ def bus(tmp_path, monkeypatch):
 def test_the_error_for_a_missing_usb_permission_gives_advice(bus, resource, vendor, may_write, is_told):
     bus(vendor, "0353", may_write)
     with pytest.raises(InstrumentLost) as caught:
-        _visa_link.open_link(resource, "@py", 0.2)
+        _scpi.open_link(resource, "@py", 0.2)
     assert ("may not use it" in str(caught.value)) is is_told
-    assert (str(shipped(_visa_link.UDEV_RULES)) in str(caught.value)) is is_told
+    assert (str(shipped(_scpi.UDEV_RULES)) in str(caught.value)) is is_told

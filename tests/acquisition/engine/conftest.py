@@ -6,10 +6,14 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from vibench.acquisition import StopLevel
+from tests.changed import changed
+from vibench.acquisition import Block, StopLevel
+from vibench.acquisition.campaign import CampaignProgress
 from vibench.acquisition.engine import (
+    BenchFacts,
     EngineClient,
     EngineProcess,
     EngineState,
@@ -17,9 +21,15 @@ from vibench.acquisition.engine import (
     Supervision,
     start_engine,
 )
-from vibench.acquisition.plan import Campaign
+from vibench.acquisition.engine._status import ChannelFacts
+from vibench.acquisition.plan import Campaign, RunState
 from vibench.acquisition.rig import Rig, load_rig
+from vibench.acquisition.run.ending import Progress
 
+CHANNEL = ChannelFacts(role="m0_velocity", unit="m/s", units_per_volt=0.1, full_scale_v=5.0)
+BENCH = BenchFacts(
+    rig_name="bench", is_simulated=True, identities={}, channels=(CHANNEL,), sample_rate_hz=1000.0
+)
 PATIENCE_S = 60.0
 LOOK_S = 0.01
 """Pause between two requests; polling without a pause would slow down the engine."""
@@ -34,6 +44,12 @@ def own_state(tmp_path_factory, monkeypatch) -> None:
 @pytest.fixture
 def shipped_rig() -> Rig:
     return load_rig("virtual_rig")
+
+
+@pytest.fixture
+def real_time_rig() -> Rig:
+    """A rig in real time, at a low sample rate, which needs little processor time."""
+    return changed(load_rig("virtual_rig"), virtual={"pace": "wall"}, daq={"sample_rate_hz": 5120.0})
 
 
 @pytest.fixture
@@ -96,3 +112,10 @@ def campaign(*names: str, duration_s: float = 600.0) -> Campaign:
     excitation["duration_s"] = duration_s
     each = [{"name": name, "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": excitation} for name in names]
     return Campaign.model_validate({"name": "trial", "measurements": each})
+
+
+def progress(path: Path, first_sample: int, volts: float) -> CampaignProgress:
+    """Return the progress of a run after a block of constant voltage."""
+    block = Block(first_sample, np.full((1, 100), volts))
+    run = Progress(RunState.RECORDING, None, block, 0.1, 10.0, 1.5, 260.0)
+    return CampaignProgress("point", 1, 1, path, run)

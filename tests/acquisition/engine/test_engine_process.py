@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from pathlib import Path
 from threading import Event
 
 import numpy as np
@@ -22,7 +21,7 @@ from vibench.acquisition import (
     StopLevel,
     open_recording,
 )
-from vibench.acquisition.bench.bench import BenchLock
+from vibench.acquisition.bench import BenchLock
 from vibench.acquisition.engine import (
     DRIVING,
     CampaignRequest,
@@ -35,8 +34,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.engine._client import EngineAddress
 from vibench.acquisition.engine._status import ConnectionRole
-from vibench.acquisition.engine._verbs import VERBS
-from vibench.acquisition.engine._wire import EngineError, send
+from vibench.acquisition.engine._wire import EngineError
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.recording import RecordingState
@@ -91,7 +89,7 @@ class TestRuns:
             compared = [each.name for each in until_state(client, EngineState.READY).check.findings]
             assert any("since last time" in name for name in compared) is not is_new
         plan = client.arm(campaign("run", duration_s=3.0), tmp_path / "new")
-        titles = ["What", "Level", "Limits", "Duration", "Saved in", "Without a viewer"]
+        titles = ["What", "Level", "Closest limit", "Duration", "Saved in", "Without a viewer"]
         assert [line.partition(":")[0] for line in plan.lines] == titles
         # The quantity that is closest to its limit has one of these units.
         assert any(f"{unit} in run" in plan.lines[2] for unit in (" m", " m/s", " m/s2", " N", " A", " V"))
@@ -141,7 +139,7 @@ class TestRuns:
         until_state(client, EngineState.RUNNING)
 
     @pytest.mark.thorough
-    def test_a_stop_ends_the_campaign_and_not_only_its_measurement(self, client, shipped_rig, tmp_path):
+    def test_a_stop_ends_the_whole_campaign_and_not_only_a_measurement(self, client, shipped_rig, tmp_path):
         start_run(client, shipped_rig, tmp_path, "first", "second")
         client.stop(StopLevel.RAMP, "enough for today")
         rows = until_state(client, EngineState.READY).rows
@@ -159,9 +157,8 @@ class TestStoppedChecks:
         assert status.check is None
         assert "the bench check was stopped: smoke in the laboratory" in status.messages[-1].what
 
-    def test_a_check_is_stopped_if_its_viewer_has_gone(self, client, shared_engine, shipped_rig, tmp_path):
-        as_slow_as_real = shipped_rig.virtual.model_copy(update={"pace": "wall"})
-        open_rig(client, shipped_rig.model_copy(update={"virtual": as_slow_as_real}))
+    def test_a_check_is_stopped_if_its_viewer_has_gone(self, client, shared_engine, real_time_rig, tmp_path):
+        open_rig(client, real_time_rig)
         client.check(tmp_path)
         with EngineClient.attach(shared_engine.address) as visitor:
             status = until_state(visitor, EngineState.READY)
@@ -171,7 +168,7 @@ class TestStoppedChecks:
             "the bench check was stopped",
         ]
 
-    def test_a_stopped_check_prevents_its_campaign(self, client, shipped_rig, tmp_path):
+    def test_a_campaign_does_not_start_if_its_check_was_stopped(self, client, shipped_rig, tmp_path):
         open_rig(client, shipped_rig)
         orders = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.NOW)
         client.arm_request(orders)
@@ -207,12 +204,12 @@ class TestRefusals:
         with pytest.raises(RecordingError, match="nothing is ever overwritten"):
             client.arm(campaign("run"), tmp_path)
 
-    def test_a_connection_without_token_is_refused(self, shared_engine):
+    def test_a_connection_without_a_token_is_refused(self, shared_engine):
         address = shared_engine.address
         with pytest.raises(EngineError, match="the connection was closed"):
             EngineClient.attach(address.model_copy(update={"token": "guessed"}))
 
-    def test_the_engine_listens_on_loopback_only(self, shared_engine):
+    def test_the_engine_listens_only_on_loopback(self, shared_engine):
         address = shared_engine.address
         assert address.host == "127.0.0.1"
         others = [info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)]
@@ -224,7 +221,7 @@ class TestRefusals:
     @pytest.mark.parametrize(
         "said", [b"GET / HTTP/1.1\r\n\r\n", b"VBE1\xff\xff\xff\xff\xff\xff\xff\xff", b"\0" * 64]
     )
-    def test_an_invalid_message_closes_only_its_connection(self, client, shared_engine, said):
+    def test_an_invalid_message_closes_only_the_connection_that_sent_it(self, client, shared_engine, said):
         at = shared_engine.address
         with socket.create_connection((at.host, at.port), 5.0) as stranger:
             stranger.sendall(said)
@@ -300,23 +297,23 @@ class TestMissingViewers:
         assert client.arm_request(loud).patience_s < 0.6
         client.arm_request(CampaignRequest(campaign=quiet, folder=tmp_path, longest_patience_s=3.0))
         client.start()
-        samples = until(client, lambda status: status.samples > 0).samples
+        samples = until(client, lambda status: status.run is not None).samples
         Event().wait(0.9)
         assert client.status().state in DRIVING
         until(client, lambda status: status.samples > samples + 50_000)
 
     @pytest.mark.thorough
-    def test_an_unattended_campaign_continues_without_its_window(self, engine, shipped_rig, tmp_path):
+    def test_an_unattended_campaign_continues_without_its_window(self, engine, real_time_rig, tmp_path):
         """The engine is attended but this campaign is not; the engine ends after the campaign."""
         process = engine()
-        process.client.open(shipped_rig)
+        process.client.open(real_time_rig)
         until_state(process.client, EngineState.READY)
-        alone = campaign("run", duration_s=120.0)
+        alone = campaign("run", duration_s=3.0)
         process.client.arm_request(
             CampaignRequest(campaign=alone, folder=tmp_path, attendance=Supervision.UNATTENDED)
         )
         process.client.start()
-        until(process.client, lambda status: status.samples > 0)
+        until(process.client, lambda status: status.run is not None)
         process.leave()
         until_exists(tmp_path / "run.h5")
         with open_recording(tmp_path / "run.h5") as recording:
@@ -332,59 +329,16 @@ class TestMissingViewers:
         until(client, lambda status: status.samples > before + 100_000)
 
     @pytest.mark.thorough
-    def test_a_frozen_viewer_does_not_block_the_engine(self, engine, shipped_rig, tmp_path):
+    def test_an_unattended_run_completes_without_requests(self, engine, real_time_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
-        start_run(client, shipped_rig, tmp_path)
-        with EngineClient.attach(process.address) as frozen:
-            # requests much data and reads nothing
-            for _ in range(20):
-                send(frozen._connection, VERBS["look"].message(most=500_000))
-            before = client.status().samples
-            until(client, lambda status: status.samples > before + 500_000)
-
-    @pytest.mark.thorough
-    def test_an_unattended_run_completes_without_requests(self, engine, shipped_rig, tmp_path):
-        process = engine(Supervision.UNATTENDED)
-        client = process.client
-        open_rig(client, shipped_rig)
-        client.arm(campaign("run", duration_s=15.0), tmp_path)
+        open_rig(client, real_time_rig)
+        client.arm(campaign("run", duration_s=3.0), tmp_path)
         client.start()
         path = tmp_path / "run.h5"
         until_exists(path)
         with open_recording(path) as recording:
             assert recording.state is RecordingState.COMPLETE
-
-    @pytest.mark.thorough
-    def test_an_armed_engine_disarms_when_its_viewer_stops_sending_requests(
-        self, client, shared_engine, shipped_rig, tmp_path
-    ):
-        open_rig(client, shipped_rig)
-        client.arm(campaign("run"), tmp_path)
-        # Visitors may look and leave: they do not attend.
-        with EngineClient.attach(shared_engine.address) as visitor:
-            until_state(visitor, EngineState.READY)
-
-    @pytest.mark.thorough
-    @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
-    @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-    def test_killing_or_freezing_a_viewer_ends_the_run_in_silence(self, shipped_rig, tmp_path, number):
-        config = tmp_path / "rig.json"
-        config.write_text(shipped_rig.model_dump_json())
-        viewer = subprocess.Popen(
-            [sys.executable, str(Path(__file__).with_name("viewer_child.py")), str(config), str(tmp_path)],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        try:
-            assert viewer.stdout.readline() == "running\n"
-            viewer.send_signal(number)
-            ended = "the program that started|" if number is signal.SIGKILL else ""
-            stop_events(tmp_path / "run.h5", f"{ended}no viewer has")
-        finally:
-            viewer.kill()
-            viewer.wait()
-            viewer.stdout.close()
 
 
 class TestEndOfTheEngine:
@@ -403,12 +357,11 @@ class TestEndOfTheEngine:
             assert engine.wait(20) == 0
 
     @pytest.mark.thorough
-    @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-    def test_a_signal_ramps_down_the_run_and_ends_the_engine(self, shipped_rig, tmp_path, number):
+    def test_sigterm_ramps_down_the_run_and_ends_the_engine(self, shipped_rig, tmp_path):
         with start_engine() as process:
             start_run(process.client, shipped_rig, tmp_path)
-            os.kill(process.pid, number)
-            stop_events(tmp_path / "run.h5", signal.Signals(number).name)
+            os.kill(process.pid, signal.SIGTERM)
+            stop_events(tmp_path / "run.h5", "SIGTERM")
             process._process.wait(20)
         assert not process.is_alive
 

@@ -1,6 +1,5 @@
 """Every request of the protocol has a message, permitted states, a handler method and a client method."""
 
-import inspect
 import json
 from time import monotonic
 
@@ -47,12 +46,9 @@ def test_stopping_and_viewing_are_allowed_in_every_state():
     assert {word for word, verb in VERBS.items() if verb.states} == RESTRICTED
 
 
-@pytest.mark.parametrize("verb", VERBS.values(), ids=VERBS.keys())
-def test_handler_and_client_methods_have_the_parameters_of_their_request(verb):
-    asked = [name for name in verb.request.model_fields if name != "ask"]
-    for owner in (EngineClient, RequestHandler):
-        _, *parameters = inspect.signature(getattr(owner, verb.method)).parameters
-        assert parameters[: len(asked)] == asked, owner
+def test_the_client_can_send_every_request():
+    for verb in VERBS.values():
+        assert hasattr(EngineClient, verb.call.__name__), verb.word
 
 
 @pytest.mark.parametrize("word", sorted(RESTRICTED - {"open", "close"}))
@@ -211,7 +207,7 @@ def test_requests_and_answers_round_trip(handler):
 
 
 @pytest.mark.thorough
-def test_a_hold_of_a_drive_that_cannot_be_held_is_refused(shipped_rig, tmp_path):
+def test_holding_a_drive_that_cannot_be_held_is_refused(shipped_rig, tmp_path):
     """A run with a dead man's switch cannot be held; a confirmed hold would end it as complete."""
     generator = shipped_rig.generator.model_copy(update={"dead_man_s": 1.0})
     engine, refusals = Engine(Supervision.UNATTENDED), []

@@ -7,26 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vibench.acquisition import Block
-from vibench.acquisition.campaign import CampaignProgress, PointOutcome, PointResult, ReasonCode
-from vibench.acquisition.engine import BenchFacts, Supervision
+from vibench.acquisition.campaign import PointOutcome, PointResult, ReasonCode
+from vibench.acquisition.engine import Supervision
 from vibench.acquisition.engine._published_state import PublishedState
-from vibench.acquisition.engine._status import ChannelFacts
-from vibench.acquisition.plan import RunState
-from vibench.acquisition.run.ending import Progress
 
-from .conftest import campaign
-
-CHANNEL = ChannelFacts(role="m0_velocity", unit="m/s", units_per_volt=0.1, full_scale_v=5.0)
-BENCH = BenchFacts(
-    rig_name="bench", is_simulated=True, identities={}, channels=(CHANNEL,), sample_rate_hz=1000.0
-)
-
-
-def progress(path, first_sample, volts):
-    block = Block(first_sample, np.full((1, 100), volts))
-    run = Progress(RunState.RECORDING, None, block, 0.1, 10.0, 1.5, 260.0)
-    return CampaignProgress("point", 1, 1, path, run)
+from .conftest import BENCH, campaign, progress
 
 
 @pytest.fixture
@@ -70,7 +55,7 @@ def test_a_missing_folder_is_published_as_no_free_disk_space(published, tmp_path
     assert published.status().disk_free_bytes == 0
 
 
-def test_elapsed_time_includes_points_kept_from_an_earlier_run(published, tmp_path):
+def test_the_elapsed_time_includes_points_kept_from_an_earlier_run(published, tmp_path):
     twice = campaign("made", "point")
     published.begin(twice, tmp_path)
     published.note_result(

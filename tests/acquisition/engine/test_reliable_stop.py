@@ -1,4 +1,4 @@
-"""A stop reaches a living engine despite stalls, thousands of connections, and missing descriptors."""
+"""A stop reaches a living engine despite stalls, other connections, and missing descriptors."""
 
 import json
 import os
@@ -31,7 +31,8 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.engine._client import Announcement
 from vibench.acquisition.engine._server import GREETING_S, VIEWERS_MOST, WAITING_MOST
 from vibench.acquisition.engine._status import ConnectionRole
-from vibench.acquisition.engine._wire import HEAD, MAGIC
+from vibench.acquisition.engine._verbs import VERBS
+from vibench.acquisition.engine._wire import HEAD, MAGIC, send
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.program import engines_folder
 from vibench.sim.operating_system.this import process_start
@@ -173,7 +174,7 @@ class TestConnectionsWithoutToken:
                     break
             assert GREETING_S * 0.9 < time.monotonic() - began_s < GREETING_S * 1.5
 
-    def test_the_least_active_viewer_is_disconnected_when_too_many_are_connected(self, process):
+    def test_the_least_active_viewer_is_disconnected_when_too_many_viewers_are_connected(self, process):
         with ExitStack() as viewers:
             attached = [
                 viewers.enter_context(EngineClient.attach(process.address)) for _ in range(VIEWERS_MOST + 3)
@@ -182,6 +183,16 @@ class TestConnectionsWithoutToken:
             process.client.status()  # the attending viewer stays; visitors are disconnected first
             with pytest.raises(EngineGone):
                 attached[0].status()
+
+
+@pytest.mark.thorough
+def test_a_frozen_viewer_does_not_block_the_engine(running):
+    with EngineClient.attach(running.address) as silent:
+        # requests much data and reads nothing
+        for _ in range(20):
+            send(silent._connection, VERBS["look"].message(most=500_000))
+        before = running.client.status().samples
+        until(running.client, lambda status: status.samples > before + 100_000)
 
 
 class TestMissingDescriptors:

@@ -1,13 +1,10 @@
 """A stop of an engine is confirmed only if the drive has ended."""
 
-import numpy as np
 import pytest
 
 from vibench import stop_files
-from vibench.acquisition import Block, StopLevel
-from vibench.acquisition.campaign import CampaignProgress
+from vibench.acquisition import StopLevel
 from vibench.acquisition.engine import (
-    BenchFacts,
     Engine,
     EngineState,
     JobQueue,
@@ -18,17 +15,9 @@ from vibench.acquisition.engine import (
     stop_engine,
     the_engine,
 )
-from vibench.acquisition.engine._status import ChannelFacts
-from vibench.acquisition.plan import RunState
-from vibench.acquisition.run.ending import Progress
 from vibench.acquisition.stopping.stop import DRIVES_ON
 
-from .conftest import campaign
-
-CHANNEL = ChannelFacts(role="m0_velocity", unit="m/s", units_per_volt=0.1, full_scale_v=5.0)
-BENCH = BenchFacts(
-    rig_name="bench", is_simulated=True, identities={}, channels=(CHANNEL,), sample_rate_hz=1000.0
-)
+from .conftest import BENCH, campaign, progress
 
 
 @pytest.fixture
@@ -36,9 +25,8 @@ def driving(tmp_path, monkeypatch):
     """An engine whose run has published one block at 1.5 Vpp and then hangs."""
     monkeypatch.setattr(stop_files, "HEEDED_S", 0.3)
     engine = Engine(Supervision.UNATTENDED)
-    run = Progress(RunState.RECORDING, None, Block(0, np.zeros((1, 100))), 0.1, 10.0, 1.5, 260.0)
     engine.published.begin(campaign("point"), tmp_path)
-    engine.published.note_progress(CampaignProgress("point", 1, 1, tmp_path / "point.h5", run), BENCH)
+    engine.published.note_progress(progress(tmp_path / "point.h5", 0, 0.0), BENCH)
     with serving(RequestHandler(engine, JobQueue(engine)), "night"):
         DRIVES_ON.begin(engine)
         yield engine

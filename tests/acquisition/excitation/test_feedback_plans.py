@@ -7,8 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from vibench.acquisition import ConfigurationError, load_campaign
-from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
-from vibench.acquisition.excitation.plan import AbstractFeedback
+from vibench.acquisition.excitation.plan import AbstractFeedback, BaseLevel, JumpSearch, Settling
 from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import (
     HUSH_S,
@@ -50,7 +49,7 @@ def test_the_duration_of_a_feedback_plan_includes_silence_and_ramps(plan):
 @pytest.mark.parametrize(
     "plan", [each for each in SMART if any(each.excitation.held_accelerations())], ids=lambda each: each.name
 )
-def test_the_voltage_needed_to_hold_a_base_level_is_checked_against_its_limit(plan, rig):
+def test_the_voltage_needed_to_hold_a_base_level_is_checked_against_the_voltage_limit(plan, rig):
     held = list(plan.excitation.held_accelerations())
     (check,) = [each for each in limit_checks(plan, rig) if "hold the base's level" in each.what]
     assert check.value == max(needed_vpp(rig, acceleration, at_hz) for at_hz, acceleration in held)

@@ -6,20 +6,19 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from vibench.acquisition.excitation.dwell import Dwell
-from vibench.acquisition.excitation.feedback import BaseLevel
-from vibench.acquisition.excitation.held_dwell import HeldDwell
-from vibench.acquisition.excitation.held_noise import HeldNoise, SpectrumPoint
-from vibench.acquisition.excitation.held_response import HeldResponse
-from vibench.acquisition.excitation.held_sweep import HeldSweep
+from vibench.acquisition.excitation.dwell import Dwell, HeldDwell
 from vibench.acquisition.excitation.kinds import EXCITATION_KINDS, Excitation, excitation_text, present_word
-from vibench.acquisition.excitation.odd_multisine import OddMultisine
-from vibench.acquisition.excitation.plan import Family, LeadIn
+from vibench.acquisition.excitation.noise import (
+    HeldNoise,
+    OddMultisine,
+    SpectrumPoint,
+    StreamedNoise,
+    WhiteNoise,
+)
+from vibench.acquisition.excitation.plan import BaseLevel, Family, LeadIn
 from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
-from vibench.acquisition.excitation.settled_sine import SettledSine
-from vibench.acquisition.excitation.sine_sweep import SineSweep
-from vibench.acquisition.excitation.stepped_level import SteppedLevel
-from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.excitation.sine_sweep import HeldSweep, SineSweep
+from vibench.acquisition.excitation.stepped_sine import HeldResponse, SettledSine, SteppedLevel, SteppedSine
 from vibench.acquisition.excitation.steps import (
     Approach,
     Direction,
@@ -27,8 +26,6 @@ from vibench.acquisition.excitation.steps import (
     RelativeSetting,
     RmsSetting,
 )
-from vibench.acquisition.excitation.streamed_noise import StreamedNoise
-from vibench.acquisition.excitation.white_noise import WhiteNoise
 from vibench.acquisition.recording import SegmentLabel
 
 BranchContinuation = pytest.importorskip(
@@ -77,7 +74,7 @@ def test_white_noise_is_also_accepted_under_its_name_from_version_0_1(word):
 
 
 @every_kind
-def test_every_recorded_segment_is_labelled_as_result_or_lead_in(excitation):
+def test_every_recorded_segment_is_labelled_as_a_result_or_as_lead_in(excitation):
     labels = {step.segment.label for step in excitation.steps()}
     assert labels - {SegmentLabel.LEAD_IN} <= set(excitation.result_labels)
     assert excitation.family in Family
@@ -91,7 +88,7 @@ def test_the_stated_band_of_a_plan_contains_all_played_frequencies(excitation):
     assert all(low_hz <= each <= high_hz for each in (*tones, excitation.highest_frequency_hz))
 
 
-def test_the_band_of_resonance_tracking_is_its_search_range():
+def test_the_band_of_resonance_tracking_is_the_search_range():
     assert by_kind["resonance_tracking"].band_hz == (240, 290)
 
 

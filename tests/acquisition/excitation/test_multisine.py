@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.excitation.multisine import (
+from vibench.acquisition.excitation.noise import (
     USUAL_POINTS as MEMORY_POINTS,
+    WhiteNoise,
     flat_periods,
     held_lines,
     hold_droop,
 )
-from vibench.acquisition.excitation.white_noise import WhiteNoise
 
 BAND = np.arange(20, 801)
 OVERSAMPLING = 16
@@ -70,13 +70,13 @@ def test_the_realisations_of_a_multisine_are_uncorrelated():
     assert abs(correlation) < 5 / np.sqrt(2 * len(BAND))
 
 
-def test_equal_seeds_give_equal_noise_periods_and_different_seeds_different_ones():
+def test_noise_periods_are_equal_for_equal_seeds_and_different_for_different_seeds():
     again = flat_periods(BAND, 1, seed=7)[0]
     np.testing.assert_array_equal(flat_periods(BAND, 1, seed=7)[0], again)
     assert not np.array_equal(flat_periods(BAND, 1, seed=8)[0], again)
 
 
-def test_more_realisations_do_not_change_the_phases_of_the_first_ones():
+def test_adding_realisations_does_not_change_the_phases_of_the_first_realisations():
     alone = flat_periods(BAND, 1, seed=7)[0]
     among = flat_periods(BAND, 4, seed=7)[0]
     np.testing.assert_allclose(among / np.max(np.abs(among)), alone, rtol=0, atol=1e-14)
@@ -111,7 +111,7 @@ def test_a_frequency_band_includes_harmonics_at_its_edges(start, width, repetiti
     assert noise.lines[-1] == start + width
 
 
-def test_the_spectrum_of_held_samples_matches_that_of_a_finely_sampled_staircase():
+def test_the_spectrum_of_held_samples_matches_the_spectrum_of_a_finely_sampled_staircase():
     (values,) = flat_periods(BAND, 1, seed=2)
     picture = np.repeat(values, OVERSAMPLING)
     fine = 2 * np.fft.rfft(picture)[: 2 * MEMORY_POINTS] / len(picture)

@@ -21,7 +21,7 @@ def levels(excitation):
     ]
 
 
-def test_levels_rise_to_the_amplitude_and_then_fall_and_state_their_direction():
+def test_levels_rise_to_the_amplitude_and_then_fall_and_every_level_states_its_direction():
     rising = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
     told = levels(plan())
     assert [way for way, _ in told] == ["up"] * 8 + ["down"] * 8

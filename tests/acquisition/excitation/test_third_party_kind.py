@@ -91,7 +91,7 @@ def test_a_third_party_kind_of_excitation_is_planned_measured_and_reported(tmp_p
         ("two_tones:Segment", "not the plan of that kind"),
     ],
 )
-def test_a_broken_third_party_kind_affects_only_its_own_plans(tmp_path, target, reason):
+def test_a_broken_third_party_kind_of_excitation_affects_only_its_own_plans(tmp_path, target, reason):
     install_kind(tmp_path, target)
     refused = run_vibench(tmp_path, "measure", "two.toml", "--out", "two", "--estimate")
     assert refused.returncode == 1

@@ -4,7 +4,7 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, run_campaign
 from vibench.acquisition.campaign import ExistingRecordings, list_recordings
-from vibench.acquisition.host.chosen import member
+from vibench.acquisition.host.toml_file import member
 
 
 def test_an_enum_member_and_its_value_as_text_are_equivalent():

@@ -92,7 +92,7 @@ def keys(part):
 
 
 @pytest.mark.parametrize("kind", FOLDERS)
-def test_every_shipped_file_names_its_schema_and_passes_it(kind):
+def test_every_shipped_file_names_its_schema_and_is_valid_under_it(kind):
     if kind == "campaign":
         pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings a kind")
     for path in all_shipped(FOLDERS[kind]):
@@ -104,7 +104,7 @@ def test_every_shipped_file_names_its_schema_and_passes_it(kind):
 
 
 @pytest.mark.parametrize("package", ["controller_package", "instrument_package"])
-def test_the_bench_of_an_example_names_its_schema_and_passes_it(package):
+def test_the_bench_of_an_example_names_its_schema_and_is_valid_under_it(package):
     path = shipped_folder("examples") / package / "bench.toml"
     text = path.read_text(encoding="utf-8")
     assert text.startswith("#:schema ")
@@ -113,7 +113,7 @@ def test_the_bench_of_an_example_names_its_schema_and_passes_it(package):
 
 
 @pytest.mark.parametrize("name", shipped_specimens())
-def test_every_shipped_specimen_names_its_schema_and_passes_it(name):
+def test_every_shipped_specimen_names_its_schema_and_is_valid_under_it(name):
     path = Path(str(files("vibench.sim") / "specimens" / f"{name}.toml"))
     text = path.read_text(encoding="utf-8")
     assert text.startswith("#:schema ../../../../schemas/specimen-1.schema.json\n")
@@ -157,7 +157,7 @@ def test_a_specimen_may_state_its_format_version(tmp_path):
         ),
     ],
 )
-def test_every_loadable_file_passes_the_schema(kind, text, tmp_path):
+def test_every_file_that_can_be_loaded_is_valid_under_the_schema(kind, text, tmp_path):
     path = tmp_path / "file.toml"
     path.write_text(text, encoding="utf-8")
     load_toml(path, MODELS[kind])
@@ -215,7 +215,7 @@ ONE_SIDED = 'model = "gong2025"\ngap_m = [30e-6, inf]'
 
 
 @pytest.mark.parametrize("kind", [SpecimenDescription, SpecimenTable])
-def test_a_saved_specimen_names_its_schema_and_satisfies_it(kind, tmp_path):
+def test_a_saved_specimen_names_its_schema_and_is_valid_under_it(kind, tmp_path):
     (tmp_path / "one_sided.toml").write_text(ONE_SIDED, encoding="utf-8")
     assert schema_errors("specimen", ONE_SIDED) == []
     for name in (*shipped_specimens(), str(tmp_path / "one_sided.toml")):
@@ -241,7 +241,7 @@ def test_a_file_of_a_later_version_is_refused_with_advice(version, tmp_path):
     path = Path(tmp_path) / "later.toml"
     text = (shipped_folder("campaigns") / "quick.toml").read_text(encoding="utf-8")
     path.write_text(f"format_version = {version}\n{text}", encoding="utf-8")
-    with pytest.raises(ConfigurationError, match="install a later vibench"):
+    with pytest.raises(ConfigurationError, match="install a later version"):
         load_campaign(path)
     path.write_text(f"format_version = 1\n{text}", encoding="utf-8")
     assert load_campaign(path) == load_campaign("quick")

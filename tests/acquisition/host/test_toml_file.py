@@ -79,6 +79,8 @@ def test_errors_name_the_key_of_the_variant_that_the_file_uses(tmp_path, text, t
     [
         (("name", '"my campaign"'), "name = 'my campaign': a file name has 1 to 64 letters, digits"),
         (("name", '""'), "name = '': a file name has"),
+        (("name", '"mine."'), "name = 'mine.': a file name has"),
+        (("name", '"mine "'), "name = 'mine ': a file name has"),
         (("name", "3"), "name = 3: give text, in quotes"),
         (("rest_s", "2026-01-01"), "rest_s = 2026-01-01: "),
     ],
@@ -149,7 +151,7 @@ DWELL = 'excitation = { kind = "dwell", amplitude_vpp = 1.0, frequency_hz = 260,
         (('"m"', '"m"\ncolour = 1'), "colour is not a known key: check its spelling"),
     ],
 )
-def test_the_error_for_an_unknown_key_names_a_known_key_only_if_it_is_similar(tmp_path, change, told):
+def test_the_error_for_an_unknown_key_names_a_known_key_only_if_both_are_similar(tmp_path, change, told):
     text = f'name = "c"\n[[measurements]]\nname = "m"\n{DWELL}\n'
     said = refusal(load_campaign, tmp_path / "campaign.toml", text.replace(*change))
     assert re.search(told, said)

@@ -112,7 +112,7 @@ class TestDefaults:
         ],
         ids=["missing values are filled in", "a given value remains", "other kinds have no effect"],
     )
-    def test_defaults_apply_to_missing_values_of_their_excitation(self, tmp_path, defaults, ramp_s, found):
+    def test_defaults_of_an_excitation_apply_to_its_missing_values(self, tmp_path, defaults, ramp_s, found):
         text = f'name = "c"\n[defaults]\n{defaults}\n' + DWELL_TABLE
         (measurement,) = load(tmp_path, text).measurements
         assert measurement.ramp_s == ramp_s
@@ -121,7 +121,7 @@ class TestDefaults:
     @pytest.mark.parametrize(
         ("defaults", "unknown"), [("ramp_ms = 9.0", "ramp_ms"), ("[defaults.dwel]\nsettle_s = 9.0", "dwel")]
     )
-    def test_a_misspelt_default_or_kind_is_refused(self, tmp_path, defaults, unknown):
+    def test_a_misspelt_default_or_kind_of_excitation_is_refused(self, tmp_path, defaults, unknown):
         text = f'name = "c"\n[defaults]\n{defaults}\n' + DWELL_TABLE
         with pytest.raises(ConfigurationError, match=rf"measurements\.0\.{unknown} is not a known key"):
             load(tmp_path, text)
@@ -144,6 +144,14 @@ class TestRefusals:
         assert said.startswith(str(tmp_path / "campaign.toml"))
         assert "measurements.0.excitation.dwell.amplitude_vpp = 5000" in said
         assert "less than or equal to 1000" in said
+
+    @pytest.mark.parametrize(("place", "name"), [('name = "c"', "con"), ('name = "dwell"', "Com1")])
+    def test_names_that_windows_reserves_are_refused_except_in_stored_plans(self, tmp_path, place, name):
+        text = ('name = "c"\n' + DWELL_TABLE).replace(place, f'name = "{name}"')
+        with pytest.raises(ConfigurationError, match=f"(?i)the name '{name}' is reserved by Windows"):
+            load(tmp_path, text)
+        stored = load(tmp_path, 'name = "c"\n' + DWELL_TABLE).model_copy(update={"name": name})
+        assert Campaign.model_validate_json(stored.model_dump_json()) == stored
 
     def test_two_measurements_with_the_same_name_are_refused(self, tmp_path):
         with pytest.raises(ConfigurationError, match="two measurements would be recorded as 'dwell'"):

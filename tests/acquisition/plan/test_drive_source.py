@@ -34,7 +34,7 @@ def drive_source(excitation, rig):
 
 
 @pytest.mark.parametrize("tone", TONES, ids=lambda tone: tone.kind)
-def test_a_sine_uses_the_analogue_output_only_if_configured_for_sines(rig, tone):
+def test_a_sine_uses_the_analogue_output_only_if_the_output_is_configured_for_sines(rig, tone):
     assert drive_source(tone, rig) is DriveSource.GENERATOR
     assert drive_source(tone, with_output(rig, OutputUse.STREAMS)) is DriveSource.GENERATOR
     assert drive_source(tone, with_output(rig, OutputUse.TONES_AND_STREAMS)) is DriveSource.OUTPUT
@@ -46,11 +46,11 @@ def test_streams_are_played_by_the_analogue_output_and_waveforms_by_the_generato
     assert drive_source(WAVEFORM, with_output(rig, plays)) is DriveSource.GENERATOR
 
 
-def test_a_stream_is_assigned_to_the_analogue_output_even_if_the_rig_has_none(rig):
+def test_a_stream_is_assigned_to_an_analogue_output_even_if_the_rig_has_no_such_output(rig):
     assert drive_source(STREAM, rig) is DriveSource.OUTPUT
 
 
-def test_the_limit_of_the_analogue_output_applies_only_to_signals_it_plays(rig):
+def test_the_limit_of_the_analogue_output_applies_only_to_signals_that_it_plays(rig):
     measurement = Measurement(name="m", excitation=TONES[0])
     named = "the analogue output's voltage (peak)"
     by_generator = limit_checks(measurement, with_output(rig, OutputUse.STREAMS))

@@ -107,7 +107,7 @@ def test_a_wrong_load_setting_doubles_every_load(linear_rig):
     )
 
 
-def test_a_violation_names_its_quantity_value_limit_source_and_remedy(rig):
+def test_a_limit_violation_names_the_quantity_the_value_the_limit_the_source_and_the_remedy(rig):
     with pytest.raises(LimitExceeded) as refused:
         require_within_limits(plan(Dwell(amplitude_vpp=10, frequency_hz=20, duration_s=1)), rig)
     text = str(refused.value)
@@ -117,7 +117,7 @@ def test_a_violation_names_its_quantity_value_limit_source_and_remedy(rig):
     assert text.endswith("Nothing was played.")
 
 
-def test_an_error_describes_the_three_largest_violations_and_counts_the_others(rig):
+def test_an_error_describes_the_three_largest_violations_and_counts_the_other_violations(rig):
     loud = plan(Dwell(amplitude_vpp=18, frequency_hz=5000, duration_s=1), ramp_s=0.05, ramp_step_s=0.01)
     violations = [check for check in limit_checks(loud, rig) if check.forbids]
     with pytest.raises(LimitExceeded) as refused:
@@ -128,7 +128,7 @@ def test_an_error_describes_the_three_largest_violations_and_counts_the_others(r
     assert text.endswith(f"; and {len(violations) - 3} more. Nothing was played.")
 
 
-def test_a_value_on_its_limit_is_allowed(rig):
+def test_a_value_equal_to_its_limit_is_allowed(rig):
     setting = rig.generator.amplitude_limit_vpp
     checks = limit_checks(plan(Dwell(amplitude_vpp=setting, frequency_hz=400, duration_s=1)), rig)
     assert checks[0].use == 1.0

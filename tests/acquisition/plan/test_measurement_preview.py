@@ -60,7 +60,7 @@ def test_the_band_in_a_preview_is_the_excited_band(name, band_hz):
     assert QUICK[name].excitation.band_hz == band_hz
 
 
-def test_the_shortest_holdable_growth_time_follows_from_the_loop_delay(rig):
+def test_the_shortest_growth_time_of_a_motion_that_the_loop_can_hold_follows_from_its_delay(rig):
     assert preview_measurement(QUICK["dwell"], rig).least_growth_time_s is None
     smart = load_campaign(ROOT / "campaigns" / "smart.toml").measurements
     (dwell,) = (each for each in smart if each.name == "dwell_260")

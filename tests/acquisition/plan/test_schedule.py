@@ -18,7 +18,7 @@ def measurement(excitation):
     return Measurement(name="one", excitation=excitation, ramp_s=0.5)
 
 
-def test_a_sweep_starts_after_check_ramp_and_settling():
+def test_a_sweep_starts_after_the_check_the_ramp_and_the_settling():
     sweep = SineSweep(amplitude_vpp=1.0, start_hz=100, stop_hz=200, duration_s=10, settle_s=2.0)
     assert lead_in_s(measurement(sweep)) == pytest.approx(CHECK_S + 0.5 + 2.0)
 

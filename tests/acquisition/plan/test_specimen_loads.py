@@ -40,7 +40,7 @@ def test_predicted_motion_without_contact_matches_the_linear_response(rig):
 
 
 @pytest.mark.parametrize("frequency_hz", [180.0, 201.0, 440.0])
-def test_predicted_motion_with_contact_is_within_50_percent(rig, frequency_hz):
+def test_predicted_motion_with_contact_is_within_50_percent_of_the_simulation(rig, frequency_hz):
     loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
     assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(peak_m(rig, 8.0, frequency_hz), rel=0.5)
 
@@ -76,7 +76,7 @@ def test_predicted_noise_loads_follow_the_linear_response_with_free_or_stuck_mas
     assert 0.95 < against / rms_m(strong, model.stuck_transfer) < 1.25
 
 
-def test_loads_without_stops_are_proportional_to_the_drive(rig):
+def test_the_loads_of_a_specimen_without_stops_are_proportional_to_the_drive(rig):
     free = rig.model_copy(update={"specimen": rig.specimen.model_copy(update={"contact": "linear"})})
     low, high = (
         predicted_loads(Dwell(amplitude_vpp=level, frequency_hz=266, duration_s=1), free)

@@ -39,7 +39,7 @@ class TestOrder:
         plan = campaign(amplitude_vpp=[0.5], frequency_hz=[200, 210], repetitions=2)
         assert [name[:7] for name in names(plan)] == ["line-r1", "line-r1", "line-r2", "line-r2"]
 
-    def test_each_excitation_of_a_sweep_combines_the_common_values_with_its_own(self):
+    def test_each_excitation_of_a_sweep_combines_the_common_values_with_its_own_values(self):
         plan = campaign(
             measurement={"excitation": {"amplitude_vpp": 1.0, "settle_s": 0.5}},
             excitations=[SWEEP, {"kind": "stepped_sine", "frequencies_hz": [200, 210]}],
@@ -176,7 +176,7 @@ POINT = {"frequency_hz": [200], "amplitude_vpp": [1]}
         ({"frequency_hz": by(300, 200, 1)}, "is not above start"),
         ({"frequency_hz": [200]}, "line-200hz: excitation.dwell.amplitude_vpp is missing"),
         ({"frequency_hz": [200], "amplitude_vpp": [5000]}, "less than or equal to 1000"),
-        ({**POINT, "order": ["frequency_hz"]}, "lacks 'amplitude_vpp'"),
+        ({**POINT, "order": ["frequency_hz"]}, "is missing 'amplitude_vpp'"),
         ({**POINT, "continue_from_previous": "amplitude_vpp"}, "must be the innermost axis"),
         ({**POINT, "continue_from_previous": "repetition"}, "is not an axis for a chain"),
         ({**POINT, "direction": ["up"]}, "has no meaning for the excitation 'dwell'"),

@@ -44,14 +44,14 @@ def test_the_key_until_accepts_only_results_of_the_excitation(kind, name):
 
 
 @pytest.mark.parametrize(("said", "meant"), [("0.1 %", 0.001), ("2%", 0.02), ("1e-3 %", 1e-5), (0.05, 0.05)])
-def test_an_until_bound_is_given_as_percentage_or_fraction(said, meant):
+def test_a_bound_of_until_may_be_a_percentage_or_a_fraction(said, meant):
     until = plan("dwell", {"response_i": said}).until
     assert until.response_i == pytest.approx(meant)
     assert type(until).model_validate_json(until.model_dump_json()) == until
 
 
 @pytest.mark.parametrize("said", ["1", "1.2.3 %", "-1 %", "0 %", "100 %", "nan %", True, 0, 1.5, "", "٣ %"])
-def test_an_invalid_until_bound_is_refused(said):
+def test_an_invalid_bound_of_until_is_refused(said):
     with pytest.raises(ValidationError):
         plan("dwell", {"response_i": said})
 
@@ -70,7 +70,7 @@ def test_a_plan_without_the_key_until_is_accepted():
 
 
 @pytest.mark.parametrize(("kind", "most_s"), [("dwell", 60), ("streamed_noise", 60), ("stepped_sine", 2)])
-def test_a_shortest_time_longer_than_the_planned_recording_is_refused(kind, most_s):
+def test_a_shortest_time_above_the_planned_recording_time_is_refused(kind, most_s):
     """Steps shorter than the default of 2 s are analysed at their end if the plan gives no shortest_s."""
     name = sorted(ALLOWED[kind])[0]
     assert plan(kind, {name: "1 %", "shortest_s": most_s}).until.shortest_s == most_s

@@ -79,7 +79,7 @@ def test_a_crash_after_any_write_loses_at_most_one_block(tmp_path, traced):
     crashed = tmp_path / "crashed.h5.part"
     crashed.write_bytes(empty)
     assert len(trace) > 300
-    # After each replayed write the file is what a crash at that moment would leave.
+    # After each replayed write, the file is what a crash at that moment would leave.
     with crashed.open("r+b", buffering=0) as file:
         for point, write in enumerate(trace):
             if write is None:

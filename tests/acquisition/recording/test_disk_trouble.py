@@ -50,7 +50,7 @@ def test_a_full_disk_refuses_a_new_recording_and_leaves_no_file(tmp_path, make_h
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_filling_disk_ends_the_recording_and_keeps_committed_samples(
+def test_a_disk_that_fills_up_ends_the_recording_and_committed_samples_are_kept(
     tmp_path, make_header, make_block, trouble
 ):
     writer = create_recording(tmp_path / "a.h5", make_header())
@@ -86,7 +86,7 @@ def test_a_commit_succeeds_after_the_disk_has_refused_two_commits(trouble):
     trouble.apply()
 
 
-def test_a_slow_disk_delays_the_writing_and_not_the_sampling(tmp_path, make_header, make_block, trouble):
+def test_a_slow_disk_delays_the_writing_but_not_the_sampling(tmp_path, make_header, make_block, trouble):
     heal = trouble.slow_down(0.2)
     writer = create_recording(tmp_path / "a.h5", make_header())
     began_s = time.monotonic()

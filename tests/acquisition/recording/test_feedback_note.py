@@ -98,7 +98,7 @@ def test_events_of_other_kinds_and_truncated_notes_are_ignored():
 
 
 @pytest.mark.parametrize("more", ['"version": 2, ', '"version": 2, "bandwidth_hz": 0.1, '])
-def test_a_note_of_an_unknown_version_is_refused_with_that_version(more):
+def test_a_note_of_an_unknown_version_is_refused_and_the_version_is_named(more):
     with pytest.raises(
         RecordingError, match=r"'level' at sample 512 \(version 2\) .* version 1\); read .* h5py"
     ):

@@ -65,14 +65,14 @@ def test_all_data_types_are_readable_by_old_readers(file):
     assert kinds == {h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING}
 
 
-def test_events_overloads_and_segments_are_stored_as_columns(file):
+def test_events_and_overloads_and_segments_are_stored_as_columns(file):
     assert file["events/text"][0].decode() == "gap 45 µm"
     assert file["overloads/first_sample"][:].tolist() == [3]
     assert file["segments/last_sample"][:].tolist() == [SAMPLES - 1]
 
 
 @pytest.mark.parametrize("samples", [1, 5, 99, 100, 101, 1000])
-def test_chunks_compressed_in_threads_equal_those_that_hdf5_makes(tmp_path, samples):
+def test_chunks_compressed_in_threads_equal_the_chunks_that_hdf5_makes(tmp_path, samples):
     counts = np.random.default_rng(samples).integers(-(2**31), 2**31, samples, dtype=np.int32)
     with h5py.File(tmp_path / "chunks.h5", "w") as file:
         ours = create_counts(file, "ours", samples, 100)

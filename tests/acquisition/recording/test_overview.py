@@ -34,7 +34,7 @@ def test_overview_bins_store_the_minimum_and_maximum_of_their_samples(sample_fil
                 assert (overview.low[number], overview.high[number]) == (part.min(), part.max())
 
 
-def test_h5py_alone_reads_the_overview_with_scale_and_axis(sample_file):
+def test_h5py_alone_reads_the_overview_with_its_scale_and_its_axis(sample_file):
     path, counts = sample_file
     with h5py.File(path, "r") as file:
         low = file["overview/m0_velocity_low"]
@@ -69,7 +69,7 @@ def test_overview_extremes_exclude_lost_samples():
     assert found.high.tolist() == [BIN_SAMPLES - 1, MISSING_COUNT, 3 * BIN_SAMPLES - 1, 4 * BIN_SAMPLES - 1]
 
 
-def test_an_overview_made_in_pieces_equals_the_whole():
+def test_an_overview_made_in_pieces_equals_an_overview_made_at_once():
     counts = np.random.default_rng(1).integers(-1000, 1000, 10 * BIN_SAMPLES + 7, dtype=np.int32)
     sums = OverviewSums()
     for first in range(0, counts.size, 3 * BIN_SAMPLES):
@@ -87,7 +87,7 @@ def test_a_recording_without_samples_has_an_empty_overview(tmp_path, make_header
         assert "default" not in file.attrs
 
 
-def test_a_file_without_an_overview_returns_none(sample_file):
+def test_the_overview_of_a_file_that_has_no_overview_is_none(sample_file):
     path, _ = sample_file
     with h5py.File(path, "r+") as file:
         del file["overview"]

@@ -59,7 +59,7 @@ def test_blocks_read_one_by_one_equal_the_whole_recording(path):
 
 
 @pytest.mark.parametrize(("start", "stop"), [(-1, 10), (0, SAMPLES + 1), (20, 10)])
-def test_reading_beyond_the_samples_is_refused(path, start, stop):
+def test_reading_beyond_the_last_sample_is_refused(path, start, stop):
     with open_recording(path) as recording, pytest.raises(RecordingError, match="has samples 0 to 2500"):
         recording.read("m0_velocity", start, stop)
 
@@ -122,7 +122,7 @@ def remove_segments(path):
     ("damage", "sentence"),
     [
         (remove, "does not exist"),
-        (rename_to_part, r"a\.h5\.part does: it is being recorded, or was interrupted"),
+        (rename_to_part, r"a\.h5\.part does: the recording is still running, or was"),
         (make_empty, "is empty"),
         (replace_by_text, "is not a readable HDF5 file"),
         (replace_by_text, "If another program wrote it, convert it with vibench import"),

@@ -116,7 +116,7 @@ def test_a_running_recording_can_be_read_by_h5py_alone(tmp_path, make_header, ma
             assert recording.state is RecordingState.RECORDING
 
 
-def test_recover_reports_when_there_is_nothing_to_recover(tmp_path):
+def test_recovery_reports_that_there_is_nothing_to_recover(tmp_path):
     with pytest.raises(RecordingError, match=r"nothing to recover; give the path of a \.h5\.part"):
         recover(tmp_path / "a.h5")
     (tmp_path / "a.h5").touch()

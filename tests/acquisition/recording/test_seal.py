@@ -89,7 +89,7 @@ def test_h5py_and_hashlib_alone_verify_a_seal(make_file):
     assert run_example(path) == (1, "changed since it was sealed: /m0_velocity")
 
 
-def test_the_h5py_example_verifies_a_signature_with_its_key_only(make_file, key_file):
+def test_the_h5py_example_accepts_a_signature_only_with_the_right_key(make_file, key_file):
     path = make_file()
     assert run_example(path, key_file)[0] == 0
     other = key_file.with_name("other")
@@ -163,7 +163,7 @@ def test_the_full_check_finds_a_changed_sample(make_file):
     assert (found.state, found.sentence) == (SealState.DAMAGED, "changed since sealing: data of /m0_velocity")
 
 
-def test_a_changed_manifest_damages_the_seal_and_resealing_changes_its_digest(make_file):
+def test_a_changed_manifest_damages_the_seal_and_a_recomputed_digest_gives_another_seal(make_file):
     path = make_file()
     with open_recording(path) as recording:
         before = recording.seal
@@ -180,7 +180,7 @@ def test_a_changed_manifest_damages_the_seal_and_resealing_changes_its_digest(ma
         assert recording.seal != before
 
 
-def test_a_recording_without_a_seal_is_reported_as_such(make_file):
+def test_a_recording_without_a_seal_is_reported_as_unsealed(make_file):
     path = make_file()
     with h5py.File(path, "r+") as file:
         del file["seal"]
@@ -209,7 +209,7 @@ def test_samples_of_an_unsealed_recording_are_checked_by_channel_checksums(make_
 
 
 @pytest.mark.parametrize("change", ["attribute", "dataset", "all but the group"])
-def test_a_seal_of_which_a_part_is_missing_is_invalid(make_file, change):
+def test_a_seal_with_a_missing_part_is_invalid(make_file, change):
     path = make_file()
     with h5py.File(path, "r+") as file:
         if change != "dataset":
@@ -252,7 +252,7 @@ def test_recovery_seals_a_recording(tmp_path, make_header, make_block):
     assert run_example(path)[0] == 0
 
 
-def test_a_damaged_copy_does_not_remove_its_source(make_file, tmp_path, make_header, make_block):
+def test_the_part_file_is_kept_if_the_finished_copy_is_damaged(make_file, tmp_path, make_header, make_block):
     path = make_file("kept.h5")
     writer = create_recording(tmp_path / "a.h5", make_header())
     writer.append(make_block(0, 2000)[1])
@@ -447,7 +447,7 @@ class TestChangedAfterTheCheck:
         with pytest.raises(RecordingError, match="was changed after its seal had been checked"):
             open_recording(long)
 
-    def test_the_seal_check_covers_metadata_that_were_read_before_it(self, long):
+    def test_the_seal_check_covers_metadata_that_were_read_before_the_check(self, long):
         sound = long.read_bytes()
         self.overwrite(long, "file.attrs['expected_samples'] = 5")
         with open_recording(long) as recording:

@@ -115,7 +115,7 @@ def test_a_block_of_the_wrong_shape_is_refused(tmp_path, make_header, make_block
 
 
 @pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="this system claims no room beforehand")
-def test_a_recording_may_exceed_its_plan_only_by_margin_and_hold_time(tmp_path, make_header, make_block):
+def test_a_recording_may_exceed_its_plan_only_by_the_margin_and_hold_time(tmp_path, make_header, make_block):
     planned, margin, hold = 4000, 10_000, 600_000
     with create_recording(tmp_path / "a.h5", make_header(expected_samples=planned)) as writer:
         claimed = disk_bytes(tmp_path)
@@ -126,7 +126,7 @@ def test_a_recording_may_exceed_its_plan_only_by_margin_and_hold_time(tmp_path, 
         for first in range(planned, planned + margin + hold, 10_000):
             counts, block = make_block(first, 10_000)
             writer.append(block)
-        with pytest.raises(RecordingError, match=r"full.*614000 fit"):
+        with pytest.raises(RecordingError, match=r"full.*614000 samples fit"):
             writer.append(make_block(planned + margin + hold, 1)[1])
     with open_recording(tmp_path / "a.h5") as recording:
         assert recording.samples == planned + margin + hold
@@ -151,7 +151,7 @@ def test_an_open_ended_recording_has_no_fixed_length(tmp_path, make_header, make
         np.testing.assert_array_equal(recording.read_counts("m0_velocity", 190_000), counts[1])
 
 
-def test_an_exception_ends_a_recording_as_failed_with_its_reason(tmp_path, make_header, make_block):
+def test_an_exception_ends_a_recording_as_failed_and_the_reason_is_stated(tmp_path, make_header, make_block):
     def measure():
         with create_recording(tmp_path / "a.h5", make_header()) as writer:
             writer.append(make_block(0, BLOCK)[1])
@@ -200,7 +200,7 @@ def test_events_and_segments_have_sample_positions(tmp_path, make_header, make_b
         assert (recording.state, recording.reason) == (RecordingState.STOPPED, "operator")
 
 
-def test_a_segment_cannot_begin_inside_another(tmp_path, make_header):
+def test_a_segment_cannot_begin_inside_another_segment(tmp_path, make_header):
     with create_recording(tmp_path / "a.h5", make_header()) as writer:
         writer.begin_segment("one")
         with pytest.raises(RecordingError, match="'one' is open"):

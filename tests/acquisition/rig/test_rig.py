@@ -68,7 +68,7 @@ def test_a_missing_file_is_refused_with_its_path(tmp_path):
 
 
 @pytest.mark.parametrize(("load", "factor"), [('"high-z"', 1.0), ("50.0", 2.0)])
-def test_a_generator_set_to_50_ohm_gives_twice_the_displayed_voltage(tmp_path, load, factor):
+def test_a_load_setting_of_50_ohm_gives_twice_the_displayed_voltage_at_the_output(tmp_path, load, factor):
     rig = load_rig(edited_config(tmp_path, 'load_ohm = "high-z"', f"load_ohm = {load}"))
     loading = 15000 / 15050
     assert rig.generator.terminal_factor() == pytest.approx(factor * loading)

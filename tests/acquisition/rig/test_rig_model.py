@@ -42,7 +42,7 @@ def test_the_amplifier_gain_is_3_db_down_at_its_band_edges():
     assert middle == pytest.approx(RIG.amplifier.gain, rel=1e-4)
 
 
-def test_force_over_acceleration_tends_to_the_suspended_mass_at_high_frequency():
+def test_the_ratio_of_force_to_acceleration_tends_to_the_suspended_mass_at_high_frequency():
     frequency_hz = 5000.0
     force = MODEL.transfer(BaseQuantity.FORCE, frequency_hz)
     acceleration = MODEL.transfer(BaseQuantity.ACCELERATION, frequency_hz)
@@ -91,7 +91,7 @@ def test_the_state_equations_of_the_rig_agree_with_its_transfer_functions(freque
 
 
 @given(st.floats(1.0, 5e3))
-def test_electrical_power_equals_heat_and_friction(frequency_hz):
+def test_the_electrical_power_equals_the_sum_of_heat_and_friction(frequency_hz):
     # Mean power of a sine from peak phasors; without specimen no other power is used.
     shaker = RIG.shaker
     voltage, current, velocity = (

@@ -106,7 +106,7 @@ def test_a_hardware_configuration_accepts_data_sheet_units():
         ({"accelerometer__full_scale_v": "5 V"}, "give a number"),
     ],
 )
-def test_the_error_for_a_wrong_unit_in_a_hardware_configuration_names_its_key(given, said):
+def test_the_error_for_a_wrong_unit_in_a_hardware_configuration_names_the_key(given, said):
     with pytest.raises(ConfigurationError) as refused:
         rig_with(**given)
     (place,) = given

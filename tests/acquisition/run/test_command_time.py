@@ -81,7 +81,7 @@ def test_a_sweep_on_a_slow_generator_is_played_correctly_or_refused(bench, tmp_p
     bench.world.latency_s = latency_s
     plan = sweep(step_s)
     if step_s < 1.25 * latency_s:
-        with pytest.raises(ConfigurationError, match=f"step_s = {step_s:g} s is too short.*for a setting"):
+        with pytest.raises(ConfigurationError, match=f"step_s = {step_s:g} s is too short.*for each setting"):
             carry_out(bench, plan, tmp_path)
         assert not bench.world.calls
         return
@@ -108,7 +108,7 @@ def test_a_drive_that_lags_its_plan_ends_the_run_with_an_error(bench, tmp_path):
         next(each for each in run if each.frequency_hz is not None and each.frequency_hz > 180.0)
         bench.world.latency_s = 0.2
         with pytest.raises(
-            DriveLate, match=r"^the drive was 1.* s behind its plan at 1.* Hz, .* lasts 0.05 s"
+            DriveLate, match=r"^the drive was 1.* s behind the plan at 1.* Hz, .* lasts 0.05 s"
         ):
             deque(run, maxlen=0)
     assert bench.recorder.ending[0] is RecordingState.FAILED

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, StopLevel, open_bench, open_recording, run_campaign
-from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.bench import Verdict
 from vibench.acquisition.check.bench_report import bench_report
 from vibench.acquisition.plan import CHECK_FREQUENCY_HZ, Campaign, Dwell, Measurement, RunState
 from vibench.acquisition.plan._schedule import CHECK_LISTEN_S, CHECK_SETTLE_S
@@ -68,8 +68,8 @@ def test_the_low_level_check_is_silent_after_its_burst(guarded, tmp_path):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("dead_man_s", [0.2, 0.5, 5.0])
-def test_the_low_level_check_gives_the_same_value_with_a_dead_man_switch(laboratory, tmp_path, dead_man_s):
+@pytest.mark.parametrize("dead_man_s", [0.2, 5.0])
+def test_a_dead_man_switch_does_not_change_the_value_of_the_low_level_check(laboratory, tmp_path, dead_man_s):
     _, connected = laboratory()
     found = []
     for each_s in (None, dead_man_s):

@@ -235,7 +235,7 @@ def test_a_memory_error_frees_the_memory_reserve_and_switches_the_output_off():
     assert not DRIVES_ON
 
 
-def test_a_run_without_memory_reserve_is_refused(monkeypatch):
+def test_a_run_without_a_memory_reserve_is_refused(monkeypatch):
     MEMORY_RESERVE.release()
 
     def refuse_memory(*_):

@@ -3,8 +3,6 @@
 Silence is checked in the simulated world, at the generator's terminal, not in the state of a driver.
 """
 
-import re
-
 import numpy as np
 import pytest
 
@@ -17,7 +15,7 @@ from vibench.acquisition import (
     open_recording,
     run_measurement,
 )
-from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
+from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.stopping.stop import Cause, StopRequest
@@ -34,27 +32,6 @@ SILENT_V = 5e-3
 SWEEP = DWELL.model_copy(
     update={"excitation": SineSweep(amplitude_vpp=1.5, start_hz=200, stop_hz=230, duration_s=3, settle_s=0.2)}
 )
-
-
-@pytest.mark.parametrize(
-    ("code", "kind", "said"),
-    [
-        (-200279, DataLost, "overwritten"),
-        (-200361, DataLost, "buffer|memory|overflow"),
-        (-200284, InstrumentError, "in time|not arrive|wait"),
-        (-201003, InstrumentLost, "gone|cannot be accessed|reached"),
-    ],
-)
-def test_a_converter_failure_ends_in_silence_and_keeps_the_recording(laboratory, tmp_path, code, kind, said):
-    virtual, connected = laboratory()
-    fail = when_recording(lambda: virtual.faults.fail_daq("ReadAnalogF64", code))
-    with bench_on(connected) as bench:
-        with pytest.raises(kind) as failure:
-            run_measurement(bench, DWELL, tmp_path / "run.h5", on_progress=fail)
-        virtual.faults.heal()
-        assert terminal_v(virtual) < 1e-2
-    assert re.search(said, str(failure.value), re.IGNORECASE), str(failure.value)
-    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, type(failure.value).__name__)
 
 
 def test_a_device_used_by_another_program_is_named_before_output(laboratory):
@@ -130,7 +107,7 @@ def test_a_drive_with_a_stuck_relay_is_silenced_by_lowering_its_amplitude(labora
             switch.ask(StopRequest(Cause.OPERATOR, StopLevel.OFF, "off pressed"))
 
     with bench_on(connected) as bench:
-        with pytest.raises(InstrumentError, match=r"its amplitude had to be lowered.*MAY STILL BE ON"):
+        with pytest.raises(InstrumentError, match=r"amplitude had to be lowered.*MAY STILL BE ON"):
             run_measurement(
                 bench, DWELL, tmp_path / "run.h5", on_progress=stop_with_stuck_relay, switch=switch
             )

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition.instruments import Block, Spacing, Sweep
 from vibench.acquisition.rig import Role
-from vibench.acquisition.run.phase_runner import GlideWatch, SweepWatch
+from vibench.acquisition.run.phase_runner import GlideWatch
 
 RATE = 5120.0
 CHANNELS = (SimpleNamespace(role=Role.M0_VELOCITY), SimpleNamespace(role=Role.DRIVE_VOLTAGE))
@@ -50,14 +50,14 @@ def test_three_whole_cycles_lost_by_a_late_drive_are_detected():
 
 
 @pytest.mark.parametrize("spacing", list(Spacing))
-def test_the_cycles_lost_because_a_sweep_started_late_are_counted_at_its_end(spacing):
+def test_the_cycles_lost_because_a_sweep_started_late_are_counted_at_the_end_of_the_sweep(spacing):
     sweep, late_s = Sweep(90.0, 530.0, 3.0, spacing), 0.02
     time_s = np.arange(round(3.0 * RATE)) / RATE
     watch = GlideWatch(CHANNELS, RATE)
-    follow = SweepWatch(watch, sweep)
+    take_block = watch.following(sweep)
     began = np.where(time_s < late_s, 90.0 * time_s, 90.0 * late_s + sweep.cycles(time_s - late_s))
     for block in drive_blocks(began):
-        follow.append(block)
+        take_block(block)
     lost = float(sweep.cycles(3.0) - 90.0 * late_s - sweep.cycles(3.0 - late_s))
     assert watch.more_cycles == pytest.approx(-(lost - 40 / RATE * 440), abs=0.4)
 

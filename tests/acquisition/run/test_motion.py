@@ -71,7 +71,7 @@ def test_the_spring_stretch_is_equal_for_every_sensor_on_m0(role, frequency_hz):
     assert amplitude(found) == pytest.approx(amplitude(by_velocity), rel=2e-3)
 
 
-def test_a_mass_moving_with_the_base_gives_no_spring_stretch():
+def test_a_mass_that_moves_with_the_base_gives_no_spring_stretch():
     turn = 2 * np.pi * 10.0
     motion = BaseTracker(RATE_HZ).follow(15.0 * np.sin(turn * TIME_S))
     seen = np.zeros(TIME_S.size, dtype=np.bool_)

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.excitation.gaussian_band import GaussianBand
-from vibench.acquisition.excitation.steps import Stream, Tone, Waveform
+from vibench.acquisition.excitation.steps import GaussianBand, Stream, Tone, Waveform
 from vibench.acquisition.plan import Phase, RunState
 from vibench.acquisition.run.stream_drive import RELEASE_S, OutputSynthesizer
 
@@ -77,7 +76,7 @@ def test_segment_boundaries_are_rounded_to_the_nearest_sample(durations):
     ends = np.round((0.1 + np.cumsum(durations)) * RATE_HZ).astype(int) - 512
     expected = np.repeat(levels, np.diff(ends, prepend=0))
     volts = synthesizer.take(expected.size)
-    # At a quarter of the sample rate a sine is 0, 1, 0, -1: every second sample shows its level.
+    # At a quarter of the sample rate, a sine is 0, 1, 0, -1: every second sample shows its level.
     np.testing.assert_allclose(np.abs(volts[1::2]), expected[1::2], atol=1e-9)
 
 

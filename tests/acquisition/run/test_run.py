@@ -36,7 +36,7 @@ from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.run.acquisition_loop import BLOCK_S
 from vibench.acquisition.run.phase_runner import HOLD_LONGEST_S
 from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.silence_watch import LISTEN_S, SILENT_V, LowLevelCheck, sine_amplitude
+from vibench.acquisition.run.silence_watch import LISTEN_S, SILENT_V, LowLevelCheck, fit_sine
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 from .ending_silent import upto
@@ -124,7 +124,7 @@ class TestCompleteRuns:
         assert lengths == {label: round(seconds * RATE) for label, seconds in expected.items()}
         assert played.recorder.samples == round((CHECK_S + 0.2 + 0.35 + 0.5 + 0.2) * RATE)
 
-    def test_every_block_states_elapsed_time_and_generator_voltage(self, played):
+    def test_every_block_states_the_elapsed_time_and_the_generator_voltage(self, played):
         shown = played.shown
         assert shown[-1].elapsed_s == pytest.approx(shown[-1].total_s)
         assert all(a.elapsed_s < b.elapsed_s for a, b in pairwise(shown))
@@ -195,7 +195,7 @@ class TestSweepsAndSteps:
         volts = bench.recorder.channel(0)[segment["first"] : segment["last"] + 1]
         assert np.max(np.abs(np.diff(volts * bench.channels[0].units_per_volt))) <= 2 * np.pi * 80 / RATE
 
-    def test_stepped_sine_settles_at_every_frequency(self, bench, tmp_path):
+    def test_a_stepped_sine_settles_at_every_frequency(self, bench, tmp_path):
         steps = SteppedSine(amplitude_vpp=1, frequencies_hz=(100, 150, 260), settle_s=0.13, record_s=0.2)
         list(run_of(bench, tmp_path, changed_dwell(excitation=steps)))
         segments = [each for each in bench.recorder.segments if each["label"] == "step"]
@@ -390,7 +390,7 @@ class TestStopLevels:
         return run, [*shown, *list(run)]
 
     @pytest.mark.parametrize("level", [StopLevel.RAMP, StopLevel.ABORT])
-    def test_a_ramp_takes_as_long_as_planned_and_an_abort_three_periods(self, bench, tmp_path, level):
+    def test_a_ramp_takes_as_long_as_planned_and_an_abort_takes_three_periods(self, bench, tmp_path, level):
         run, shown = self.stop_at_levels(bench, tmp_path, level)
         ramp_s = SLOW.ramp_s if level is StopLevel.RAMP else shortest_ramp_s(bench.rig)
         took_s = shown[-1].elapsed_s - shown[0].elapsed_s - LISTEN_S
@@ -485,7 +485,7 @@ class TestStopLevels:
         assert "not silent" in text_of_silence(bench)
         assert bench.recorder.ending[0] is RecordingState.FAILED
 
-    def test_mains_hum_does_not_count_as_drive(self, bench, tmp_path):
+    def test_mains_hum_does_not_count_as_a_drive_signal(self, bench, tmp_path):
         bench.world.hum_v = 0.012
         run = run_upto(RunState.RECORDING, bench, tmp_path, changed_dwell(excitation=LOUD))
         run.switch.ask(by_operator(StopLevel.ABORT))
@@ -553,7 +553,7 @@ class TestRefusals:
         text = self.require_refusal(bench, tmp_path, changed_dwell(excitation=noise), ConfigurationError)
         assert "use white_noise with more realisations" in text
 
-    def test_a_bench_without_a_recorded_drive_is_refused(self, bench, tmp_path):
+    def test_a_bench_without_a_drive_voltage_channel_is_refused(self, bench, tmp_path):
         bench.channels = bench.channels[1:]
         assert "no drive_voltage channel" in self.require_refusal(bench, tmp_path, DWELL, CheckFailed)
 
@@ -567,7 +567,7 @@ class TestTheBenchCheck:
             ({"drive_factor": 0.0}, "check the wire from the generator"),
             ({"base_factor": 1.5}, "the base acceleration is"),
             ({"base_factor": 0.6}, "check the amplifier's gain"),
-            ({"background_m_per_s2": 10.0}, "before anything plays"),
+            ({"background_m_per_s2": 10.0}, "before any signal is played"),
         ],
     )
     def test_a_low_level_check_that_finds_a_deviation_prevents_output(self, bench, tmp_path, fault, sentence):
@@ -598,7 +598,7 @@ class TestTheBenchCheck:
     def test_a_sine_is_measured_despite_offset_and_drift(self, frequency_hz, amplitude, phase, offset, drift):
         time_s = np.arange(2000) / RATE
         volts = amplitude * np.sin(2 * np.pi * frequency_hz * time_s + phase) + offset + drift * time_s
-        assert sine_amplitude(volts, frequency_hz, RATE) == pytest.approx(amplitude, rel=1e-6, abs=1e-9)
+        assert fit_sine(volts, frequency_hz, RATE).amplitude == pytest.approx(amplitude, rel=1e-6, abs=1e-9)
 
 
 class TestOverloads:

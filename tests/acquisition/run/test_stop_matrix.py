@@ -27,10 +27,12 @@ from vibench.acquisition import (
     open_recording,
     stop_on_signal,
 )
+from vibench.acquisition.instruments import Block
 from vibench.acquisition.plan import Dwell, Measurement, RunState, shortest_ramp_s
 from vibench.acquisition.recording import RecordingState, create_recording, recover
 from vibench.acquisition.run.acquisition_loop import BLOCK_S
 from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.silence_watch import SilenceWatch
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 from .ending_silent import bench_on, terminal_v, upto
@@ -320,8 +322,22 @@ def test_a_run_with_a_slow_generator_is_silent_within_the_stated_time_after_an_a
     assert float(said.removeprefix("abort: ").partition(" ")[0]) < ABORTED_WITHIN_S
 
 
+@pytest.mark.parametrize("offset_v", [0.0, 0.3])
+def test_the_time_to_silence_does_not_depend_on_the_length_of_the_block_in_which_the_drive_ends(
+    rig, offset_v
+):
+    with open_bench(rig) as bench:
+        watch = SilenceWatch(bench.channels, 1000.0)
+        volts = np.full((len(bench.channels), 400), offset_v)
+    volts[:, :50] += np.linspace(1.0, 0.1, 50)
+    watch.begin(0)
+    watch.take(Block(first_sample=0, volts=volts))
+    watch.take(Block(first_sample=400, volts=volts[:, 380:]))
+    assert watch.text().startswith("0.050 s after the stop was seen, silence was measured")
+
+
 @pytest.mark.thorough
-def test_an_abort_in_real_time_is_recorded_until_the_drive_is_silent(rig, tmp_path):
+def test_after_an_abort_in_real_time_recording_continues_until_the_drive_is_silent(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
     with open_bench(on_the_wall) as bench, Run(bench, PLAN, tmp_path / "run.h5") as run:

@@ -238,7 +238,7 @@ class TestEndsOfARun:
         assert world.played > sounding[-1]
 
     @heard_state
-    def test_a_failed_write_to_the_output_stops_it_at_once(self, streaming_bench, tmp_path, state):
+    def test_a_failed_write_to_the_output_stops_the_output_at_once(self, streaming_bench, tmp_path, state):
         world = streaming_bench.world
         run = run_upto(state, streaming_bench, tmp_path)
         world.permanent["write"] = lambda: DataLost("the output ran out of samples")

@@ -4,7 +4,6 @@ Silence is checked at the amplifier's input in the simulated world, while the ou
 state of a driver does not count.
 """
 
-import re
 import signal
 
 import numpy as np
@@ -13,16 +12,15 @@ import pytest
 from vibench.acquisition import (
     InstrumentError,
     InstrumentLost,
-    LimitExceeded,
     RecordingError,
     open_recording,
     run_measurement,
 )
 from vibench.acquisition.errors import DataLost
-from vibench.acquisition.plan import InRunLimits, Measurement, RunState, StreamedNoise
+from vibench.acquisition.plan import Measurement, RunState, StreamedNoise
 from vibench.acquisition.recording import RecordingState, create_recording
 from vibench.acquisition.rig import load_rig
-from vibench.virtual_rig.world.wiring import Coupling, Input
+from vibench.virtual_rig.world.conversion import Coupling, Input
 
 from .ending_silent import bench_on, kept_drive, when_recording
 
@@ -76,42 +74,14 @@ def one_sentence(failure):
 
 
 @pytest.mark.thorough
-def test_an_output_over_a_limit_fades_out_and_the_limit_is_named(laboratory, tmp_path):
-    virtual, connected = laboratory()
-    # The noise reaches some 100 m/s2; 736 m/s2 are allowed.
-    tight = PLAN.model_copy(update={"limits": InRunLimits(base_acceleration=0.05)})
-    with bench_on(connected) as bench:
-        with pytest.raises(LimitExceeded) as failure:
-            run_measurement(bench, tight, tmp_path / "run.h5")
-        assert amplifier_input_v(virtual) < SILENT_V
-    assert re.search(r"base acceleration reached .* above the limit of 36\.8 m/s2", one_sentence(failure))
-    drive = kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "base acceleration reached")
-    # The samples written ahead were played, then a ramp to zero.
-    assert np.max(np.abs(drive[-200:])) < 0.01
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("code", [-200290, -200018])
-def test_an_output_that_underflows_ends_the_run(laboratory, tmp_path, code):
-    virtual, connected = laboratory()
-    fail = when_recording(lambda: virtual.faults.fail_daq("WriteAnalogF64", code))
-    with bench_on(connected) as bench:
-        with pytest.raises(DataLost, match=r"ran out of samples.*To do: write further ahead") as failure:
-            run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=fail)
-        virtual.faults.heal()
-        assert amplifier_input_v(virtual) < SILENT_V
-    one_sentence(failure)
-    kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
-
-
-@pytest.mark.thorough
 def test_a_long_pause_of_the_computer_empties_the_output_buffer_and_ends_in_silence(laboratory, tmp_path):
     virtual, connected = laboratory()
     pause = when_recording(lambda: advance(virtual, 1.0))
     with bench_on(connected) as bench:
-        with pytest.raises(DataLost, match="ran out of samples"):
+        with pytest.raises(DataLost, match=r"ran out of samples.*To do: write further ahead") as failure:
             run_measurement(bench, PLAN, tmp_path / "run.h5", on_progress=pause)
         assert amplifier_input_v(virtual) < SILENT_V
+    one_sentence(failure)
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "DataLost.*ran out of samples")
 
 
@@ -129,9 +99,7 @@ def test_after_the_death_of_the_server_at_most_the_written_samples_are_played(la
     kept_drive(tmp_path / "run.h5", RecordingState.FAILED, "InstrumentLost.*MAY STILL BE PLAYING")
 
 
-@pytest.mark.parametrize(
-    ("code", "kind"), [(-200279, DataLost), (-200361, DataLost), (-200284, InstrumentError)]
-)
+@pytest.mark.parametrize(("code", "kind"), [(-200361, DataLost), (-200284, InstrumentError)])
 def test_a_failing_input_fades_the_output_out(laboratory, tmp_path, code, kind):
     virtual, connected = laboratory()
     fail = when_recording(lambda: virtual.faults.fail_daq("ReadAnalogF64", code))
@@ -162,7 +130,7 @@ def test_after_ctrl_c_the_written_samples_and_a_ramp_are_played_before_silence(l
     assert np.max(np.abs(drive[-200:])) < 0.01
 
 
-def test_after_a_second_ctrl_c_the_ramp_is_skipped_and_the_output_silent(laboratory, tmp_path):
+def test_after_a_second_ctrl_c_the_ramp_is_skipped_and_the_output_is_silent(laboratory, tmp_path):
     virtual, connected = laboratory()
     insist = when_recording(lambda: [signal.raise_signal(signal.SIGINT) for _ in range(2)])
     with bench_on(connected) as bench:

@@ -21,7 +21,7 @@ def resident_mb():
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_a_ten_minute_recording_loses_no_sample_and_memory_stays_constant(tmp_path):
+def test_a_ten_minute_recording_loses_no_sample_and_uses_constant_memory(tmp_path):
     memory_mb = []
 
     def watch(progress):

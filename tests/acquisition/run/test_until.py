@@ -67,9 +67,10 @@ def test_a_dwell_ends_when_the_error_of_its_response_is_small_enough(rig, tmp_pa
 
 
 @pytest.mark.thorough
-def test_a_dwell_that_does_not_reach_its_bound_ends_after_its_longest_time(rig, tmp_path):
+@pytest.mark.parametrize("shortest_s", [0.5, 5e-324])
+def test_a_dwell_that_does_not_reach_its_bound_ends_after_its_longest_time(rig, tmp_path, shortest_s):
     dwell = Dwell(amplitude_vpp=0.1, frequency_hz=200, settle_s=0.5, duration_s=3)
-    outcome, recording, _ = record(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=0.5))
+    outcome, recording, _ = record(rig, tmp_path, dwell, Until(response_ii=1e-9, shortest_s=shortest_s))
     with recording:
         (note,) = notes(recording)
         assert seconds(recording, "dwell") == [pytest.approx(3.0)]
@@ -90,7 +91,7 @@ def test_each_frequency_step_ends_when_its_bound_is_met(rig, tmp_path):
 
 
 @pytest.mark.thorough
-def test_noise_with_an_until_bound_ends_with_a_whole_realisation_and_a_ramp_down(rig, tmp_path):
+def test_noise_with_the_key_until_ends_with_a_whole_realisation_and_a_ramp_down(rig, tmp_path):
     noise = WhiteNoise(
         amplitude_vpp=0.05, band_start_hz=20, band_stop_hz=800, repetition_hz=2, settle_s=0.5, realisations=40
     )
@@ -124,7 +125,7 @@ def test_a_stream_with_buffered_samples_ends_when_its_bound_is_met(tmp_path):
 
 
 @pytest.mark.thorough
-def test_a_stop_ends_a_recording_that_has_an_until_bound(rig, tmp_path):
+def test_a_stop_ends_a_recording_with_the_key_until(rig, tmp_path):
     switch = StopSwitch()
     plan = Measurement(
         name="run",
@@ -171,6 +172,6 @@ def test_the_recording_continues_if_the_analysis_process_dies(rig, tmp_path, mon
         ({"response_i": 0.5}, "not within 20 s"),
     ],
 )
-def test_the_remaining_time_assumes_a_bound_proportional_to_1_over_sqrt_time(bounds, said):
+def test_the_remaining_time_is_estimated_with_a_bound_proportional_to_1_over_sqrt_time(bounds, said):
     progress = UntilNote(stretch=1, wishes={"response_i": 0.01}, bounds=bounds, looked_s=4.0, longest_s=20.0)
     assert said in progress.sentence

@@ -113,7 +113,7 @@ def test_an_announcement_is_restored_after_the_state_folder_was_emptied(own_stat
 
 
 @pytest.mark.thorough
-def test_a_killed_program_is_reported_until_its_rig_is_opened_again_and_silent(capsys):
+def test_a_killed_program_is_reported_until_its_rig_was_opened_again_and_is_silent(capsys):
     script = (
         "from vibench.acquisition import *; from vibench.acquisition.stopping.program import note_open_bench;"
         "note_open_bench('lab'); a = stop_on_signal(StopSwitch(), 'x'); a.__enter__(); input(1)"
@@ -262,7 +262,7 @@ def test_a_program_is_refused_without_leftovers_if_the_state_folder_is_full(own_
     assert [each.name for each in own_state.rglob("*") if each.is_file()] == []
 
 
-def test_the_announcement_of_a_program_that_opened_a_bench_is_removed_at_its_end():
+def test_the_announcement_of_a_program_that_opened_a_bench_is_removed_when_the_program_ends():
     with stop_on_signal(StopSwitch(), "dwell"):
         note_open_bench("lab")
         assert [each.rigs for each in announced_programs(Program) if "lab" in each.rigs]

@@ -61,7 +61,7 @@ def survives(number):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
-def test_a_second_ctrl_z_does_not_stop_faster(default_handlers, tmp_path, monkeypatch):
+def test_a_second_ctrl_z_does_not_stop_a_run_faster(default_handlers, tmp_path, monkeypatch):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):

@@ -6,8 +6,7 @@ import pytest
 from benchmarks.noise_verdicts import noise_points, regular_points
 from benchmarks.stroboscopic_section import stroboscopic_section
 from vibench.analysis import AnalysisError, motion_verdict
-from vibench.analysis.chaos.period import Points, shortest_period
-from vibench.analysis.chaos.verdict import MotionKind
+from vibench.analysis.chaos.verdict import MotionKind, Points, shortest_period
 from vibench.sim import Harmonic, gong2025, lyapunov_exponent
 
 DRIVE_HZ = 260.0
@@ -86,7 +85,7 @@ def test_the_verdict_after_transient_chaos_describes_the_final_motion(chaos, set
     points = np.vstack((chaos[:-settled], np.full((settled, 2), 0.2)))
     found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
     assert (found.kind, found.period, found.evidence.periods) == (MotionKind.PERIODIC, 1, settled)
-    assert f"{settled} drive periods only" in found.why
+    assert f"only for the last {settled} drive periods" in found.why
 
 
 @pytest.mark.thorough
@@ -224,12 +223,6 @@ def test_the_exponent_estimated_from_poincare_points_is_a_lower_bound(name):
             said += 1
             assert 0 < least <= exponent * DRIVE_HZ
     assert said or name == "stops"
-
-
-def test_random_points_give_no_exponent():
-    rng = np.random.default_rng(2)
-    found = motion_verdict(Points(rng.standard_normal((600, 2)), QUIET), DRIVE_HZ)
-    assert (found.kind, found.least_exponent_per_s) == (MotionKind.UNDECIDED, None)
 
 
 @pytest.mark.parametrize(("seed", "number"), [(4303, 0), (52, 42), (54, 42), (51, 36), (65, 30)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin, NotEnoughData, curve_difference, curve_peaks
-from vibench.analysis.comparison.curve import sorted_curve
+from vibench.analysis.comparison import sorted_curve
 from vibench.analysis.figures.comparison import comparison_figure
 from vibench.analysis.report import ImageKind
 

@@ -60,7 +60,7 @@ def test_a_chain_driven_by_recorded_noise_has_the_linear_transmission(noise_file
     assert chain_figure(found).svg
 
 
-def test_alternating_cells_repeat_along_the_chain_and_changed_values_apply_to_all():
+def test_alternating_cells_repeat_along_the_chain_and_changed_values_apply_to_all_cells():
     others = (SpecimenTable.model_validate("heavy"), SpecimenTable.model_validate("asymmetric"))
     request = ChainRequest(others=others, lengths=(5,), gap_m=30e-6)
     chain = request.chain(5)
@@ -85,7 +85,7 @@ def test_an_invalid_chain_request_is_refused_with_a_readable_message(options, sa
         ChainRequest(**options)
 
 
-def test_a_steady_chain_reaches_a_requested_error():
+def test_a_steady_chain_reaches_a_target_error():
     request = ChainRequest(lengths=(2,), start_hz=220.0, stop_hz=220.0, amplitude_m=5e-6, error="5 %")
     (run,) = chain_answer(request).runs
     assert np.all(run.transmission_error <= 0.05)
@@ -113,6 +113,6 @@ def test_the_stated_errors_of_spectral_lines_hold_in_95_percent_of_cases():
         ({"drive": "swept", "stop_hz": 300.0}, "needs a steady drive, not swept"),
     ],
 )
-def test_options_fixed_by_an_error_target_of_a_chain_are_refused(given, said):
+def test_chain_options_that_an_error_target_fixes_are_refused(given, said):
     with pytest.raises(ValidationError, match=said):
         ChainRequest(**{"error": 0.01, **given})

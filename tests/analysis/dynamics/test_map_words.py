@@ -47,11 +47,11 @@ CHAOS = MapMotion(MotionKind.CHAOTIC_SO_FAR, None, True, 4.08, 2.0, Share(0.7134
     [
         (0, None, "71.34% of the points"),
         (0, 0, "71.34% of the points"),
-        (0, 5, "71.34% of the points; if all points were computed 17.07% to 96.78%"),
-        (3, None, "71.34% of the points; with other random initial states 17.07% to 96.78%"),
+        (0, 5, "71.34% of the points; if all points were computed, it would be 17.07% to 96.78%"),
+        (3, None, "71.34% of the points; with other random initial states, it would be 17.07% to 96.78%"),
     ],
 )
-def test_the_share_of_a_motion_in_a_map_has_an_interval_only_if_estimated(random_starts, filled, end):
+def test_only_an_estimated_share_of_a_motion_in_a_map_has_an_interval(random_starts, filled, end):
     plan = Map(frequency_hz=Range(start=100.0, stop=200.0, points=3), random_starts=random_starts)
     audit = None if filled is None else Audit(filled, 0, 0, (0.0,), (0.0,))
     said = motion_words(SimpleNamespace(plan=plan, audit=audit), CHAOS)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import PathCollection
 
-from vibench.analysis import NotEnoughData, Simulation, analyse_files, recorded_response
+from vibench.analysis import Simulation, analyse_files, recorded_response
 from vibench.analysis.report import map_figure, write_report
 from vibench.analysis.report._report import draw_maps
 from vibench.sim.maps import Map, Range, solve_map
@@ -45,8 +45,3 @@ def test_a_report_overlays_recordings_only_on_frequency_amplitude_maps(small_map
     assert beside.axes
     page = write_report(results, tmp_path / "report.html", maps=[small_map]).read_text("utf-8")
     assert "Map of motions: drive frequency" in page
-
-
-def test_a_recording_without_level_over_frequency_is_refused_before_it_is_analysed(noise_file):
-    with pytest.raises(NotEnoughData, match="does not contain levels for a range of frequencies"):
-        recorded_response(noise_file(samples=100))  # too short for an analysis

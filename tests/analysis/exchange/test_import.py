@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 
-from vibench.acquisition import ConfigurationError, RecordingError, load_toml, open_recording
+from vibench.acquisition import ConfigurationError, load_toml, open_recording
 from vibench.acquisition.recording import RecordingState
 from vibench.analysis import AnalysisError, InvalidRequest, analyse
 from vibench.analysis.errors import UnusableData
@@ -27,7 +27,7 @@ from vibench.analysis.exchange import (
     import_recording,
     open_source,
 )
-from vibench.sim.hdf5_files.door import allow_external_data
+from vibench.sim.hdf5_files import allow_external_data
 
 RATE_HZ = 8000.0
 SAMPLES = 60_000
@@ -77,14 +77,7 @@ def test_the_columns_of_a_table_in_hdf5_become_channels(tmp_path):
     assert recording.started_utc.startswith("2026-03-01T12:00:00")
 
 
-def test_rows_of_a_matlab_matrix_become_channels(tmp_path):
-    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
-        file["v"] = signals()[:1]
-    _, values = read_import(tmp_path / "a.mat", mapping(tmp_path, ("v", "m0_velocity", "")))
-    assert_same(values, signals()[:1])
-
-
-def test_the_scales_of_file_and_mapping_are_multiplied_and_integers_stay_exact(tmp_path):
+def test_the_scales_of_the_file_and_of_the_mapping_are_multiplied_and_integers_stay_exact(tmp_path):
     counts = np.random.default_rng(1).integers(-(2**23), 2**23, SAMPLES, dtype=np.int32)
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["acc"] = counts
@@ -144,7 +137,7 @@ def test_non_finite_values_are_imported_as_lost_samples(tmp_path):
         ("mm/s", 'scale = "250 mm/s/V"', "for a file in volts"),
         ("um", "scale = 1.0", "choose another channel"),
         ("g", "", "choose another channel"),
-        ("V", "", "sensitivity of its sensor"),
+        ("V", "", "sensitivity of the sensor"),
         ("knots", "", "as a number of 'm s-1' per 'knots'"),
     ],
 )
@@ -161,7 +154,7 @@ def test_a_unit_in_the_file_sets_the_scale_and_an_unsuitable_unit_is_refused(tmp
     assert_same(values, [signals()[0], factor * signals()[1]])
 
 
-def test_a_tdms_file_is_imported_with_rate_and_values(tmp_path):
+def test_a_tdms_file_is_imported_with_its_rate_and_its_values(tmp_path):
     nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
     about = {"wf_increment": 1 / RATE_HZ, "unit_string": "V"}
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
@@ -357,29 +350,6 @@ def test_a_dwell_that_was_exported_and_imported_gives_the_same_results(dwell_fil
 
 
 @pytest.mark.thorough
-def test_noise_that_was_exported_and_imported_gives_the_same_transmission(noise_file, tmp_path):
-    with open_recording(noise_file()) as recording:
-        original = analyse(recording)
-        path, *_ = export_samples(excerpt(recording), Format.MAT, tmp_path / "noise.mat")
-        rate = recording.sample_rate_hz
-        parts = [(each.start / rate, each.stop / rate) for each in recording.segments]
-        roles = recording.roles
-    plan = original.excitation.model_dump()
-    head = (
-        f"started_utc = 2026-03-01T12:00:00Z\nsample_rate_hz = {rate!r}\n"
-        f"parts = [{', '.join(f'{{ start_s = {a!r}, stop_s = {b!r} }}' for a, b in parts)}]\n"
-        '[measurement]\nname = "noise"\nexcitation = { '
-        + ", ".join(f"{key} = {json.dumps(value)}" for key, value in plan.items())
-        + " }\n"
-    )
-    channels = [(f"{role}.values", role, "") for role in roles]
-    found = analyse(import_recording(path, mapping(tmp_path, *channels, head=head), tmp_path / "made.h5"))
-    wanted = original.response.frequency_response
-    np.testing.assert_array_equal(found.response.frequency_response.frequency_hz, wanted.frequency_hz)
-    np.testing.assert_allclose(found.response.frequency_response.value, wanted.value, rtol=1e-4)
-
-
-@pytest.mark.thorough
 def test_export_and_import_use_bounded_memory(tmp_path):
     samples = 2_000_000
     with h5py.File(tmp_path / "long.h5", "w") as file:
@@ -422,7 +392,7 @@ def test_an_imported_recording_names_its_source(tmp_path):
         ('role = "m0_velocity"', 'role = "drive_voltage"\nscale = "10 V/V"', "a voltage; give a number"),
     ],
 )
-def test_a_wrong_mapping_names_its_key(tmp_path, old, new, said):
+def test_the_error_for_a_wrong_mapping_names_the_key(tmp_path, old, new, said):
     text = DWELL + CHANNEL.format("1", "m0_velocity", "")
     (tmp_path / "map.toml").write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(ConfigurationError, match=said):
@@ -437,6 +407,7 @@ def test_an_unsuitable_mapping_is_refused_without_leftovers(tmp_path):
         ([("w", "m0_velocity", "")], DWELL, r"no channel 'w'; it has '/short' \(short\), '/x/v' \(v\)"),
         ([("v", "m0_velocity", "")], DWELL, "several channels 'v'"),
         ([("/x/v", *one[1:]), ("/short", "drive_voltage", "")], DWELL, "have different numbers of samples"),
+        ([("/x/v", *one[1:]), ("/x/v", "base_acceleration", "")], DWELL, "are both read from '/x/v'"),
         ([("/x/v", *one[1:])], DWELL.replace("sample_rate_hz = 8000.0\n", ""), "give sample_rate_hz"),
         ([("/x/v", *one[1:])], "begins_s = 7.0\n" + DWELL, "no part of the plan begins within the 7.5 s"),
     ]
@@ -444,12 +415,6 @@ def test_an_unsuitable_mapping_is_refused_without_leftovers(tmp_path):
         with pytest.raises(InvalidRequest, match=said):
             import_recording(tmp_path / "a.h5", mapping(tmp_path, *channels, head=head), tmp_path / "made.h5")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["a.h5", "map.toml"]
-
-
-def test_a_sampling_rate_far_from_the_rate_in_the_file_is_refused(tmp_path):
-    wavfile.write(tmp_path / "a.wav", 44_100, signals()[0].astype(np.float32))
-    with pytest.raises(InvalidRequest, match="states 44100 samples/s, but the mapping 8000"):
-        import_recording(tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")), tmp_path / "b.h5")
 
 
 @pytest.mark.parametrize(
@@ -463,14 +428,14 @@ def test_a_sampling_rate_far_from_the_rate_in_the_file_is_refused(tmp_path):
         ("time [s]", 1.0, 2, 1000.0),
     ],
 )
-def test_a_sampling_rate_contradicting_a_time_column_is_refused(tmp_path, heading, unit_s, digits, rate_hz):
+def test_a_rate_that_contradicts_a_time_column_is_refused(tmp_path, heading, unit_s, digits, rate_hz):
     rows = (f"{k / rate_hz / unit_s:.{digits}f};{value!r}\n" for k, value in enumerate(signals()[0].tolist()))
     (tmp_path / "a.csv").write_text(f"{heading};v\n" + "".join(rows), encoding="utf-8")
     meaning = mapping(tmp_path, ("v", "m0_velocity", ""))
     if rate_hz == RATE_HZ:
         assert read_import(tmp_path / "a.csv", meaning)[0].sample_rate_hz == RATE_HZ
         return
-    with pytest.raises(InvalidRequest, match=r"a\.csv states .* samples/s, but the mapping 8000; correct"):
+    with pytest.raises(InvalidRequest, match=r"a\.csv states .* samples/s, but the mapping states 8000"):
         read_import(tmp_path / "a.csv", meaning)
     assert not (tmp_path / "made.h5").exists()
 
@@ -481,7 +446,7 @@ def test_a_sampling_rate_contradicting_a_time_column_is_refused(tmp_path, headin
         (
             "  1.95313E-05",
             "s",
-            "states about 51200 samples/s, but the mapping 8000; correct the mapping, or export",
+            "states about 51200 samples/s, but the mapping states 8000; correct the mapping, or export",
         ),
         ("  1.25000D-04", "s", None),
         ("  2.00000E-01", "ms", "states about 5000 samples/s"),
@@ -513,7 +478,7 @@ def test_a_sampling_rate_that_contradicts_a_vibench_export_is_refused(known, tmp
     source = "m0_velocity.values" if to is Format.MAT else "m0_velocity"
     for each in (path, known.path):
         meaning = mapping(tmp_path, (source if each is path else "/m0_velocity", "m0_velocity", ""))
-        with pytest.raises(InvalidRequest, match=r"states .* samples/s, but the mapping 8000"):
+        with pytest.raises(InvalidRequest, match=r"states .* samples/s, but the mapping states 8000"):
             read_import(each, meaning, tmp_path / "made.h5")
 
 
@@ -601,7 +566,7 @@ def test_a_unit_in_hdf5_may_be_a_fixed_or_variable_length_string(tmp_path, text,
 
 
 @pytest.mark.parametrize("heading", ["m0 / Gal", "m0 / ips", "m0 / ft/s^2"])
-def test_an_unknown_unit_in_a_heading_is_not_taken_as_si(tmp_path, heading):
+def test_an_unknown_unit_in_a_heading_is_not_taken_as_an_si_unit(tmp_path, heading):
     text = "".join(f"{number / 8000:.6f};{number % 7}\n" for number in range(40_000))
     (tmp_path / "a.csv").write_text(f"time / s;{heading}\n{text}")
     with pytest.raises(
@@ -611,7 +576,7 @@ def test_an_unknown_unit_in_a_heading_is_not_taken_as_si(tmp_path, heading):
 
 
 @pytest.mark.parametrize("encoding", ["cp037", "utf-16-le"])
-def test_the_error_for_zero_bytes_in_a_text_table_explains_them(tmp_path, encoding):
+def test_the_error_for_zero_bytes_in_a_text_table_explains_the_zero_bytes(tmp_path, encoding):
     text = "Zeit [s];v [m/s]\n" + "".join(f"{0.001 * number:.3f};1\n" for number in range(20))
     (tmp_path / "a.csv").write_bytes(text.encode(encoding) + b"\0\0\0")
     with (
@@ -682,17 +647,7 @@ def test_external_links_are_followed_only_if_allowed(tmp_path):
         assert [each.name for each in source.channels] == ["/v"]
 
 
-def test_an_import_never_overwrites_a_file(tmp_path):
-    wavfile.write(tmp_path / "a.wav", int(RATE_HZ), signals()[0].astype(np.float32))
-    (tmp_path / "made.h5").write_text("mine")
-    with pytest.raises(RecordingError, match="nothing is ever overwritten"):
-        import_recording(
-            tmp_path / "a.wav", mapping(tmp_path, ("1", "m0_velocity", "")), tmp_path / "made.h5"
-        )
-    assert (tmp_path / "made.h5").read_text() == "mine"
-
-
-def test_an_interrupted_import_leaves_nothing(tmp_path):
+def test_an_interrupted_import_leaves_no_file(tmp_path):
     def interrupt(_):
         raise KeyboardInterrupt
 

@@ -72,15 +72,15 @@ def formatted_times(places, rate_hz, form):
     raise AssertionError(form)
 
 
+KINDS = ("single", "blocks", "packets", "every second", "every third")
 FORMS = [(10_000.0, "0.1 ms"), (10_000.0, "us"), (5120.0, "exact"), (5120.0, "us"), (10_000.0, "float32 ms")]
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.thorough)])
-@pytest.mark.parametrize("share", [0.01, 0.05, 0.1, 0.2, 0.4])
-@pytest.mark.parametrize("kind", ["single", "blocks", "packets", "every second", "every third"])
-def test_every_missing_row_is_counted_as_lost(tmp_path, kind, share, seed):
-    rng = np.random.default_rng([seed, round(100 * share), len(kind)])
-    rate_hz, form = FORMS[rng.integers(len(FORMS))]
+@pytest.mark.parametrize("share", [0.01, 0.1, 0.4])
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_missing_row_is_counted_as_lost(tmp_path, kind, share):
+    rng = np.random.default_rng([1, round(100 * share), len(kind)])
+    rate_hz, form = FORMS[(KINDS.index(kind) + round(10 * share)) % len(FORMS)]
     places = kept_rows(kind, min(share, 0.3) if kind == "every third" else share, rng)
     times, unit = formatted_times(places, rate_hz, form)
     path = csv_file(tmp_path / "mine.csv", times, places, rate_hz, unit)
@@ -117,7 +117,7 @@ def test_a_sampling_rate_inferred_from_times_with_many_missing_rows_must_be_conf
     path = csv_file(tmp_path / "mine.csv", *formatted_times(places, 10_000.0, "0.1 ms")[:1], places, 10_000.0)
     with pytest.raises(InvalidRequest, match=r"its times give about 10000\); give sample_rate_hz"):
         import_recording(path, meaning(), tmp_path / "a.h5")
-    with pytest.raises(InvalidRequest, match="about 10000 samples/s, but the mapping 8000") as refused:
+    with pytest.raises(InvalidRequest, match="about 10000 samples/s, but the mapping states 8000") as refused:
         import_recording(path, meaning(8000.0), tmp_path / "a.h5")
     assert "even" not in str(refused.value)
 
@@ -136,12 +136,11 @@ def uneven_times(fault, rng):
     raise AssertionError(fault)
 
 
-@pytest.mark.parametrize("seed", [5, 6])
 @pytest.mark.parametrize(
     "fault", ["jitter", "drift", "steps of any length", "1.2 digits", "1.96 digits", "2.5 digits"]
 )
-def test_uneven_and_coarse_times_with_missing_rows_are_refused(tmp_path, fault, seed):
-    places = uneven_times(fault, np.random.default_rng(seed))
+def test_uneven_and_coarse_times_with_missing_rows_are_refused(tmp_path, fault):
+    places = uneven_times(fault, np.random.default_rng(5))
     digits = float(fault.split()[0]) if "digits" in fault else 1.0
     times = [f"{0.1 * each:.7g}" for each in places]
     path = csv_file(tmp_path / "mine.csv", times, places, 10_000.0)
@@ -159,7 +158,7 @@ def test_a_refusal_names_the_channel_by_its_heading(tmp_path):
         import_recording(path, meaning(10_000.0), tmp_path / "a.h5")
 
 
-@pytest.mark.parametrize("share", [0.0, 0.02, 0.1])
+@pytest.mark.parametrize("share", [0.0, 0.02])
 def test_times_that_show_lost_samples_are_reported_even_if_a_mapping_replaces_them(tmp_path, share):
     places = kept_rows("single", share, np.random.default_rng(8), DWELL_SAMPLES)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
@@ -182,7 +181,7 @@ def test_a_dwell_with_missing_rows_is_refused_but_a_part_without_gaps_is_analyse
 
 @pytest.mark.thorough
 def test_a_file_with_more_gaps_than_a_recording_can_store_is_refused_without_leftovers(tmp_path):
-    places = np.flatnonzero(np.arange(200_000) % 23 != np.arange(200_000) // 23 % 20)
+    places = np.flatnonzero(np.arange(100_000) % 23 != np.arange(100_000) // 23 % 20)
     path = csv_file(tmp_path / "mine.csv", formatted_times(places, 10_000.0, "0.1 ms")[0], places, 10_000.0)
     with pytest.raises(InvalidRequest, match="missing in more than 4096 places of the file"):
         import_recording(path, meaning(10_000.0), tmp_path / "a.h5")

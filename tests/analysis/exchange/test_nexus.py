@@ -47,12 +47,12 @@ def faults(group, path="/"):
             yield from faults(child, f"{path}{name}/")
 
 
-def test_a_nexus_file_follows_the_definitions(nexus):
+def test_a_nexus_file_follows_the_nexus_definitions(nexus):
     with h5py.File(nexus) as file:
         assert list(faults(file)) == []
 
 
-def test_nexus_values_are_physical_and_errors_are_half_a_step(nexus, known, known_values):
+def test_nexus_values_have_physical_units_and_errors_of_half_a_converter_step(nexus, known, known_values):
     with h5py.File(nexus) as file:
         for role in known.roles:
             data = file["entry"][role]

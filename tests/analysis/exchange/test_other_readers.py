@@ -31,7 +31,7 @@ def with_result(known_file, tmp_path_factory):
     return path
 
 
-def test_variables_opened_by_xarray_have_names_scales_and_dimensions(with_result, known_values):
+def test_variables_opened_by_xarray_have_names_and_scales_and_dimensions(with_result, known_values):
     xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
     pytest.importorskip("h5netcdf", reason="pip install vibench[exchange] brings h5netcdf")
     with xarray.open_dataset(with_result, engine="h5netcdf") as data:
@@ -69,7 +69,7 @@ def h5dump(*arguments):
     return subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=True).stdout
 
 
-def test_h5dump_shows_channels_with_unit_scale_and_time_axis(with_result):
+def test_h5dump_shows_channels_with_their_unit_their_scale_and_their_time_axis(with_result):
     head = h5dump("-A", "-d", "/m0_velocity", with_result)
     assert "H5T_STD_I32LE" in head
     assert re.search(r'ATTRIBUTE "units".*?"m s-1"', head, re.DOTALL)

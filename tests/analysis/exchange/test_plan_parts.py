@@ -17,14 +17,6 @@ NOISE = {
     "realisations": 3,
     "settle_s": 1.0,
 }
-SWEEP = {
-    "kind": "sine_sweep",
-    "amplitude_vpp": 1.0,
-    "start_hz": 150.0,
-    "stop_hz": 350.0,
-    "duration_s": 20.0,
-    "settle_s": 2.0,
-}
 
 
 def mapping_of(excitation, **more):
@@ -45,12 +37,6 @@ def test_the_realisations_of_an_imported_plan_alternate_with_settling_times():
     parts = place_parts(mapping_of(NOISE, begins_s=0.5), 1000.0, 10_000)
     assert ranges(parts) == [(1500, 2000), (3000, 3500), (4500, 5000)]
     assert [each.segment.numbers["realisation"] for each in parts] == [0, 1, 2]
-
-
-def test_the_steps_of_a_sweep_form_one_part():
-    (part,) = place_parts(mapping_of(SWEEP), 1000.0, 30_000)
-    assert (part.start, part.stop) == (2000, 22_000)
-    assert part.segment.label == "sweep"
 
 
 def test_parts_given_in_the_mapping_take_the_labels_of_the_plan():

@@ -24,7 +24,7 @@ from scipy.io import savemat
 from vibench.acquisition import load_toml, open_recording
 from vibench.analysis import FrequencyResponseRequest, analyse
 from vibench.analysis.exchange import ImportMapping, import_recording
-from vibench.analysis.frequency_response.request import Window
+from vibench.analysis.frequency_response.results import Window
 
 MAPPINGS = Path(__file__).parents[3] / "examples" / "mappings"
 FILES = {
@@ -92,7 +92,7 @@ def test_the_response_to_a_hammer_hit_has_the_published_peaks(
 ):
     """The authors read the extremes of real and imaginary part; this test does so in our estimate."""
     band = analysis_of("tool_hammer").response.frequency_response.between(low_hz, high_hz)
-    # With this mapping the transmission is i w times acceleration over force.
+    # With this mapping, the transmission is i w times acceleration over force.
     receptance = 1j * band.value / (2 * np.pi * band.frequency_hz) ** 3
     places = (receptance.imag.argmin(), receptance.real.argmax(), receptance.real.argmin())
     line, rise, fall = (band.frequency_hz[place] for place in places)

@@ -33,7 +33,7 @@ def test_published_stable_motions_have_the_stated_frequency_and_amplitude(cycles
 
 
 @pytest.mark.thorough
-def test_published_unstable_amplitudes_are_below_the_stable_ones_and_fall_with_wind_speed(cycles):
+def test_published_unstable_amplitudes_are_below_the_stable_amplitudes_and_fall_with_wind_speed(cycles):
     stable, unstable = (
         [cycles[f"{kind}_v{each}"] for each in speeds]
         for kind, speeds in (("stable", STABLE), ("unstable", UNSTABLE))

@@ -96,7 +96,7 @@ def test_a_scan_report_has_one_figure_over_all_points(results, tmp_path):
         assert np.all(read[f"relative_half_width_{at}"] < 0.2)
 
 
-def test_the_latest_attempt_counts_and_repetitions_form_separate_scans(results):
+def test_only_the_latest_attempt_is_used_and_each_repetition_forms_a_scan(results):
     analyses = [each.analysis for each in results.noise]
     assert all(isinstance(each, NoiseAnalysis) for each in analyses)
 
@@ -137,5 +137,5 @@ def test_comparisons_and_fits_use_only_scan_points_on_m0(folder, results):
         results, results=tuple(each for each in results.results if each.analysis.facts.mass != "m0")
     )
     assert len(others.results) == 2
-    with pytest.raises(NotEnoughData, match="has no result for m0, to which a specimen could be fitted"):
+    with pytest.raises(NotEnoughData, match="has no result for m0, so no specimen can be fitted"):
         update_model(others)

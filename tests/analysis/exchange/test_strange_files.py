@@ -1,6 +1,6 @@
 """Files of other programs with unusual times, units and scales are read correctly or refused."""
 
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta, timezone
 
 import h5py
 import numpy as np
@@ -68,13 +68,29 @@ FORMS = (
 )
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("start", ["2026-02-28 23:59:59.6Z", "2026-03-04 11:59:59Z"])
+MIDNIGHT, NOON = "2026-02-28 23:59:59.6Z", "2026-03-04 11:59:59Z"
+
+
+@pytest.mark.parametrize(
+    ("form", "start"),
+    [*((form, MIDNIGHT) for form in FORMS), *((form, NOON) for form in FORMS if "%I" in form)],
+)
 def test_dates_and_times_in_any_format_determine_sample_positions(tmp_path, form, start):
     kept = np.delete(np.arange(TIMES.size), slice(1500, 1537))
     clock = [(datetime.fromisoformat(start) + timedelta(seconds=TIMES[k])).strftime(form) for k in kept]
     head = "Date;Time;u;a;v" if ";" in form else "Time;u;a;v"
     is_right(read_import(text(tmp_path / "a.csv", head, (clock, *signal(TIMES[kept])), ";")), lost=37)
+
+
+@pytest.mark.parametrize(("winter_h", "summer_h"), [(1, 2), (-3.5, -2.5)])
+@pytest.mark.parametrize("change", ["spring", "autumn"])
+def test_local_times_with_a_zone_continue_when_summer_time_changes(tmp_path, winter_h, summer_h, change):
+    hours = (winter_h, summer_h) if change == "spring" else (summer_h, winter_h)
+    before, after = (timedelta(hours=each) for each in hours)
+    turn = datetime(2026, 3, 29, 1, tzinfo=UTC)
+    moments = [turn + timedelta(seconds=each - 1.0) for each in TIMES]
+    clock = [each.astimezone(timezone(before if each < turn else after)).isoformat() for each in moments]
+    is_right(read_import(text(tmp_path / "a.csv", "Time;u;a;v", (clock, *signal(TIMES)), ";")), lost=0)
 
 
 def test_a_record_continued_on_the_next_day_is_refused(tmp_path):
@@ -136,7 +152,7 @@ def test_contradictory_units_and_scales_in_a_heading_are_refused(tmp_path, head,
 
 @pytest.mark.parametrize("line", ["XINCR 2.0E-4", "Acquisition frequency [Hz]: 5000", "recorded at 5000 Hz"])
 def test_a_sampling_rate_in_a_heading_line_of_another_form_is_compared_with_the_mapping(tmp_path, line):
-    with pytest.raises(InvalidRequest, match="states 5000 samples/s, but the mapping 5120"):
+    with pytest.raises(InvalidRequest, match="states 5000 samples/s, but the mapping states 5120"):
         read_import(text(tmp_path / "a.csv", f"{line}\nu\ta\tv", signal(TIMES), "\t"))
 
 
@@ -259,6 +275,9 @@ def test_unlabelled_motion_in_a_universal_file_uses_its_length_unit(tmp_path):
         made = pyuff.prepare_58(binary=0, data=scale * row, x=TIMES, id1=name, **kinds, **axes, **about)
         pyuff.UFF(str(path)).write_sets([made], "add")
     is_right(read_import(path))
+    path.write_bytes(path.read_bytes().replace(b"         5mm", b"         1SI"))
+    with pytest.raises(InvalidRequest, match="is in 'm or mm/s2' in the file"):
+        read_import(path)
 
 
 def to_tdms(path, channels):
@@ -307,22 +326,35 @@ def with_facts(tmp_path, suffix, values, facts):
     return lambda **more: read_import(path, names, **more)
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
-@pytest.mark.parametrize("word", ["unit", "EU", "engineering_unit", "PhysicalUnit", "y_units", "Einheit"])
+@pytest.mark.parametrize(
+    ("suffix", "word"),
+    [
+        (".tdms", "unit"),
+        (".tdms", "EU"),
+        (".h5", "engineering_unit"),
+        (".h5", "unit"),
+        (".mat", "PhysicalUnit"),
+        (".mat", "Einheit"),
+        ("73.mat", "y_units"),
+        ("73.mat", "unit"),
+    ],
+)
 def test_a_unit_attribute_with_any_common_name_is_applied(tmp_path, suffix, word):
     volts, acceleration, velocity = signal(TIMES)
     units = [{word: unit} for unit in ("V", "g", "mm/s")]
     is_right(with_facts(tmp_path, suffix, (volts, acceleration / G, 1000 * velocity), units)())
 
 
-def test_the_unit_of_one_variable_is_not_applied_to_another(tmp_path):
+def test_the_unit_of_one_variable_is_not_applied_to_another_variable(tmp_path):
     values = dict(zip("uav", signal(TIMES), strict=True)) | {"a": signal(TIMES)[1] / G, "a_unit": "g"}
     savemat(tmp_path / "a.mat", values)
     is_right(read_import(tmp_path / "a.mat"))
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
-@pytest.mark.parametrize("name", ["wf_xunit_string", "x_unit"])
+@pytest.mark.parametrize(
+    ("suffix", "name"),
+    [(".tdms", "wf_xunit_string"), (".h5", "x_unit"), (".mat", "wf_xunit_string"), ("73.mat", "x_unit")],
+)
 def test_a_time_increment_is_read_in_its_stated_unit(tmp_path, suffix, name):
     in_ms, in_hz = ([{"wf_increment": 1e3 / RATE_HZ, name: unit}] * 3 for unit in ("ms", "Hz"))
     is_right(with_facts(tmp_path, suffix, signal(TIMES), in_ms)())
@@ -330,16 +362,15 @@ def test_a_time_increment_is_read_in_its_stated_unit(tmp_path, suffix, name):
         with_facts(tmp_path, suffix, signal(TIMES), in_hz)()
 
 
-@pytest.mark.parametrize("suffix", WRITERS)
 @pytest.mark.parametrize(
-    "facts",
+    ("suffix", "facts"),
     [
-        ({}, {}, {"t0": 0.0025}),
-        ({"delay": 0.0}, {"delay": 0.0}, {"delay": 0.0025}),
-        ({"time_shift": 0.0}, {"time_shift": 0.0}, {"time_shift": 0.0025}),
-        ({}, {}, {"trigger_time": "12:00:00.0025"}),
-        ({"first_sample": 0.0}, {"first_sample": 0.0}, {"first_sample": 13.0}),
-        tuple({"start_time": f"01/03/2026 12:00:0{second}"} for second in (0, 0, 1)),
+        *((suffix, ({}, {}, {"t0": 0.0025})) for suffix in WRITERS),
+        (".tdms", ({"delay": 0.0}, {"delay": 0.0}, {"delay": 0.0025})),
+        (".h5", ({"time_shift": 0.0}, {"time_shift": 0.0}, {"time_shift": 0.0025})),
+        (".mat", ({}, {}, {"trigger_time": "12:00:00.0025"})),
+        ("73.mat", ({"first_sample": 0.0}, {"first_sample": 0.0}, {"first_sample": 13.0})),
+        (".tdms", tuple({"start_time": f"01/03/2026 12:00:0{second}"} for second in (0, 0, 1))),
     ],
 )
 def test_channel_start_times_that_cannot_be_compared_are_refused(tmp_path, suffix, facts):
@@ -399,8 +430,10 @@ def test_several_start_times_or_gains_of_one_table_are_refused(tmp_path, suffix,
         read_import(tmp_path / f"a{suffix}", names)
 
 
-@pytest.mark.parametrize("order", [(0, 1, 2, 3, 4, 5), (3, 4, 5, 0, 1, 2), (3, 0, 4, 1, 5, 2)])
-@pytest.mark.parametrize("suffix", [".csv", ".mat"])
+@pytest.mark.parametrize(
+    ("suffix", "order"),
+    [(".csv", (0, 1, 2, 3, 4, 5)), (".csv", (3, 0, 4, 1, 5, 2)), (".mat", (3, 4, 5, 0, 1, 2))],
+)
 def test_times_that_cannot_be_assigned_to_a_channel_are_refused(tmp_path, suffix, order):
     late = TIMES + LATE / RATE_HZ
     columns = [TIMES, TIMES, late, *signal(TIMES)[:2], signal(late)[2]]
@@ -437,7 +470,7 @@ def test_rates_and_times_in_another_group_of_the_file_are_used(tmp_path, suffix,
     if fact == "time":
         is_right(read_import(path, names), lost=37)
     else:
-        with pytest.raises(InvalidRequest, match="states 5000 samples/s, but the mapping 5120"):
+        with pytest.raises(InvalidRequest, match="states 5000 samples/s, but the mapping states 5120"):
             read_import(path, names)
 
 
@@ -453,8 +486,7 @@ def test_a_unit_or_scale_that_changes_within_a_tdms_file_is_refused(tmp_path, fa
         read_import(tmp_path / "a.tdms")
 
 
-@pytest.mark.parametrize("mark", [-999.0, -9999.0, 32767.0])
-@pytest.mark.parametrize("suffix", [".csv", ".mat", ".h5"])
+@pytest.mark.parametrize(("suffix", "mark"), [(".csv", -999.0), (".mat", -9999.0), (".h5", 32767.0)])
 def test_numbers_that_mark_lost_samples_are_refused(tmp_path, suffix, mark):
     columns = dict(zip("uav", signal(TIMES), strict=True))
     columns["v"][700:710] = mark
@@ -467,7 +499,7 @@ def test_numbers_that_mark_lost_samples_are_refused(tmp_path, suffix, mark):
         hdf5(path, columns)
         names = ("/u", "/a", "/v")
     with pytest.raises(
-        UnusableData, match=rf"has 10 samples of exactly {abs(mark):g} or .* marked lost samples"
+        UnusableData, match=rf"has 10 samples of exactly {abs(mark):g} or .* mark lost samples"
     ):
         read_import(path, names)
 

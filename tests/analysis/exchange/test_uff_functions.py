@@ -18,7 +18,7 @@ from vibench.analysis.exchange import (
     open_source,
 )
 from vibench.analysis.results.spectral_functions import spectral_functions
-from vibench.analysis.spectra.spectra import spectral_density
+from vibench.analysis.spectra import spectral_density
 from vibench.cli.__main__ import app
 from vibench.sim import gong2025
 
@@ -145,7 +145,7 @@ def test_exported_densities_cover_only_the_played_segments_and_name_them(tmp_pat
     assert read["id4"].endswith(told), read["id4"]
 
 
-def test_a_recording_without_drive_has_no_spectral_densities(tmp_path):
+def test_a_recording_without_a_drive_signal_has_no_spectral_densities(tmp_path):
     with open_recording(write_parts(tmp_path / "a.h5", RUN)) as recording:
         for stretch in ((0.0, 1.5), (0.0, 2.4)):
             with pytest.raises(
@@ -154,21 +154,15 @@ def test_a_recording_without_drive_has_no_spectral_densities(tmp_path):
                 next(spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest()))
 
 
-def test_a_format_without_spectra_is_refused_and_a_suitable_one_named(known, tmp_path):
-    with pytest.raises(InvalidRequest, match=r"spectra were requested as csv.*choose uff"):
-        export_functions(excerpt(known), [], Format.CSV, tmp_path / "a.csv")
-    assert not list(tmp_path.iterdir())
-
-
 def test_an_existing_file_or_a_wrong_format_is_refused_before_spectra_are_computed(known, tmp_path):
     computed = (pytest.fail("this takes minutes") for _ in "once")
     (tmp_path / "a.uff").touch()
     for to in (Format.UFF, Format.CSV):
-        with pytest.raises(InvalidRequest, match=r"a\.uff exists|spectra were requested as csv"):
+        with pytest.raises(InvalidRequest, match=r"a\.uff exists|spectra were requested as csv.*choose uff"):
             export_functions(excerpt(known), computed, to, tmp_path / f"a.{to.value}")
 
 
-def test_an_import_ignores_spectra(known, tmp_path):
+def test_an_import_ignores_the_spectra_in_a_file(known, tmp_path):
     hz = np.arange(1.0, 5.0)
     path, _ = export_functions(excerpt(known), [function(hz, hz * 1j)], Format.UFF, tmp_path / "a.uff")
     mixed, _ = export_samples(excerpt(known), Format.UFF, tmp_path / "b.uff")
@@ -190,10 +184,10 @@ def velocity_of_m0(hz):
     return np.array(found)
 
 
-@pytest.mark.parametrize("spacing_hz", [1.0000175, 0.99998333, 0.25, 1.0666667])
+@pytest.mark.parametrize("spacing_hz", [1.0000175, 0.25, 1.0666667])
 def test_modal_software_finds_the_modes_for_any_band_and_clock_ratio(known, tmp_path, spacing_hz):
     wanted = gong2025(contact="linear").natural_frequencies_hz
-    for number, start_hz in enumerate((10, 25, 37, 60, 73)):
+    for number, start_hz in enumerate((10, 37, 73)):
         hz = spacing_hz * np.arange(np.ceil(start_hz / spacing_hz), 605 / spacing_hz)
         given = [
             function(hz, velocity_of_m0(hz)),

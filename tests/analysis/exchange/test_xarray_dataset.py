@@ -10,7 +10,7 @@ from vibench.analysis.exchange import xarray_dataset
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
 
 
-def test_a_dataset_holds_the_values_units_and_times_of_the_recording(known, known_values):
+def test_a_dataset_holds_the_values_and_units_and_times_of_the_recording(known, known_values):
     data = xarray_dataset(known)
     assert list(data.data_vars) == list(known.roles)
     for role in known.roles:

@@ -7,7 +7,7 @@ import pytest
 from tests.analysis.hidden_motion import shaken_world as world
 from vibench.analysis import Simulation, analyse_files, update_model
 from vibench.analysis.fit.collision_numbers import track_recordings
-from vibench.analysis.fit.suspects import Assumption
+from vibench.analysis.fit.specimen_fit import Assumption
 from vibench.analysis.hidden_motion import Hidden
 from vibench.sim import gong2025
 

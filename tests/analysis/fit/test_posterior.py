@@ -35,7 +35,7 @@ def cases():
 
 
 @pytest.mark.thorough
-def test_the_95_percent_bounds_of_the_posterior_have_their_coverage_and_a_useful_width(cases):
+def test_the_95_percent_bounds_of_the_posterior_have_the_stated_coverage_and_a_useful_width(cases):
     bounds = np.array([np.quantile(each.draws, [0.025, 0.975], axis=0) for _, each in cases])
     held = np.array([(low <= true) & (true <= high) for (true, _), (low, high) in zip(cases, bounds)])  # noqa: B905
     count = held[:, :2].size
@@ -47,7 +47,7 @@ def test_the_95_percent_bounds_of_the_posterior_have_their_coverage_and_a_useful
 
 
 @pytest.mark.thorough
-def test_uninformative_statistics_leave_bounds_as_wide_as_those_of_the_prior(cases):
+def test_uninformative_statistics_give_bounds_as_wide_as_the_bounds_of_the_prior(cases):
     wide = [np.ptp(np.quantile(each.draws[:, 2], [0.025, 0.975])) for _, each in cases]
     assert np.median(wide) > 0.85 * 2.0
 

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 
 from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, NotEnoughData
-from vibench.analysis.fit.lines import own_response
-from vibench.analysis.fit.parameters import LINEAR, Parameter, parameter_value, with_values
-from vibench.analysis.fit.specimen_fit import fit_specimen
-from vibench.analysis.fit.suspects import Assumption
+from vibench.analysis.fit.lines import LINEAR, Parameter, parameter_value, with_values
+from vibench.analysis.fit.specimen_fit import Assumption, fit_specimen
 from vibench.analysis.frequency_response.results import FrequencyResponseSettings
-from vibench.analysis.signals.confidence import student_half_width
+from vibench.analysis.signals.averaging import student_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 NOMINAL = gong2025()
@@ -64,14 +62,6 @@ def realisation_average(specimen, rng, sd, realisations):
 @pytest.fixture(scope="module")
 def true():
     return with_values(NOMINAL, TRUE)
-
-
-def test_specimen_parameters_round_trip(true):
-    for name, value in TRUE.items():
-        assert parameter_value(true, name) == pytest.approx(value, rel=1e-12)
-    assert true.masses == NOMINAL.masses
-    assert true.gap_m == NOMINAL.gap_m
-    assert with_values(true, {Parameter.GAP: 50e-6}).gap_m == 50e-6
 
 
 def test_scaled_gaps_and_dampings_keep_their_ratios():
@@ -144,7 +134,7 @@ def test_noise_of_any_level_neither_rejects_a_true_model_nor_makes_the_fit_diver
         else:
             assert fit.fits, (sd, fit.reduced_chi_square, fit.limit)
     assert 0 < len(said) < 30
-    assert all(each.endswith("measure longer or with more drive") for each in said)
+    assert all(each.endswith("measure longer, or with a stronger drive") for each in said)
 
 
 def test_the_high_pass_and_the_delay_of_a_channel_do_not_bias_the_fit(true):
@@ -167,17 +157,12 @@ def test_frequency_intervals_include_the_uncertainty_of_the_converter_clock(true
         assert found.low <= value <= found.high, name
 
 
-def test_parameters_not_fitted_keep_their_described_values(true):
+def test_parameters_that_are_not_fitted_keep_their_described_values(true):
     fit = fit_specimen(transmission(true, np.random.default_rng(1)), true, (Parameter.DAMPING_TIME,))
     assert [each.parameter for each in fit.values] == [Parameter.DAMPING_TIME]
     assert fit.specimen.stiffnesses == pytest.approx(true.stiffnesses, rel=1e-12)
     with pytest.raises(InvalidRequest, match="f0_hz was not fitted"):
         fit.value(Parameter.F0)
-
-
-def test_the_response_used_in_the_fit_equals_the_base_transmissibility(true):
-    ours = own_response(true, LINES_HZ, np.zeros(0))
-    assert ours == pytest.approx(base_transmissibility(true, LINES_HZ)[:, 0], rel=1e-10)
 
 
 WRONG = {
@@ -189,7 +174,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("assumption", WRONG)
-def test_a_fit_with_one_wrong_assumption_is_rejected_and_the_assumption_named_as_suspect(true, assumption):
+def test_a_fit_with_one_wrong_assumption_is_rejected_and_the_assumption_is_named_as_suspect(true, assumption):
     factors = WRONG[assumption]
     other = with_values(true, {each: f * parameter_value(true, each) for each, f in factors.items()})
     gain = 1.01 if assumption is Assumption.SENSITIVITY else 1.0
@@ -209,7 +194,7 @@ def test_a_fit_with_one_wrong_assumption_is_rejected_and_the_assumption_named_as
 
 
 def test_causes_that_cannot_be_distinguished_are_named_together(true):
-    """At one level of linear motion a damper and friction have the same effect."""
+    """At one level of linear motion, a damper and friction have the same effect."""
     other = with_values(true, {Parameter.C0: 3.0 * parameter_value(true, Parameter.C0)})
     fit = fit_specimen(transmission(other, np.random.default_rng(2), sd=2e-3), NOMINAL)
     assert {each.assumption for each in fit.suspects if each.may_be_it} == {

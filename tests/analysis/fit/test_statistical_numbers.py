@@ -1,4 +1,4 @@
-"""Statistics of an untrackable chaotic motion determine gap and m1, with correct bounds."""
+"""Statistics of a chaotic motion that cannot be tracked determine gap and m1, with correct bounds."""
 
 import json
 import math
@@ -44,7 +44,7 @@ def holds(number, true):
 
 
 @pytest.mark.thorough
-def test_statistics_determine_mean_gap_and_m1_but_not_the_exponent(noisy_dwell):
+def test_statistics_determine_the_mean_gap_and_m1_but_not_the_exponent(noisy_dwell):
     with open_recording(noisy_dwell.path) as recording:
         found, _ = statistical_numbers(recording, gong2025(), STRETCH_S, 260.0, rounds=FEW)
     told = {each.what: each for each in found}
@@ -88,8 +88,8 @@ def test_a_rig_with_a_wrong_base_response_is_refused_before_the_fit(noisy_dwell,
 @pytest.mark.parametrize(
     ("specimen", "stretch_s", "why"),
     [
-        (gong2025(), (0.5, 0.7), "0.2 s of this motion at 51200 samples/s are too little"),
-        (gong2025(), (1.4, 1.7), "too little for statistics"),
+        (gong2025(), (0.5, 0.7), "0.2 s of this motion at 51200 samples/s are too short"),
+        (gong2025(), (1.4, 1.7), "too short for statistics"),
         (gong2025(contact="rigid:0.8"), STRETCH_S, "cannot be tracked"),
         (gong2025(contact="linear"), STRETCH_S, "without stops"),
         (gong2025(gap_m=(math.inf, 4e-5)), STRETCH_S, "a stop on one side only"),

@@ -8,8 +8,8 @@ from tests.analysis.virtual_measurements import RIG, record, weak_noise as noise
 from vibench.acquisition import open_recording
 from vibench.analysis import Simulation, analyse, analyse_files, update_model
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.fit.suspects import Assumption
-from vibench.analysis.overlay.shaker_fit import fit_shaker
+from vibench.analysis.fit.specimen_fit import Assumption
+from vibench.analysis.overlay.driven_rig import fit_shaker
 from vibench.sim import gong2025
 
 pytestmark = pytest.mark.thorough

@@ -9,8 +9,8 @@ import pytest
 from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import Dwell
 from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, update_model
-from vibench.analysis.fit.gap_fit import bracketed_gap, brackets, fit_gap, onsets, swept_response
-from vibench.analysis.fit.parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.analysis.fit.collision_numbers import brackets, onset_gap, onsets, swept_response
+from vibench.analysis.fit.lines import LINEAR, Parameter, parameter_value, with_values
 from vibench.analysis.report import findings
 from vibench.sim import Sampled, base_transmissibility, gong2025, integrate
 
@@ -60,7 +60,7 @@ def fitted_model(campaign):
 
 
 @pytest.mark.thorough
-def test_fitted_intervals_contain_the_true_and_exclude_the_described_values(fitted_model):
+def test_fitted_intervals_contain_true_values_and_exclude_described_values(fitted_model):
     assert [each.parameter for each in fitted_model.values] == [*LINEAR, Parameter.GAP]
     for each in fitted_model.values:
         truth = parameter_value(TRUE, each.parameter)
@@ -92,13 +92,13 @@ def test_fitted_intervals_are_narrow_enough_to_be_useful(fitted_model):
     assert relative[Parameter.GAP] < 0.15
 
 
-def test_the_onset_frequency_of_collisions_is_that_of_the_first_impact(recordings, campaign):
+def test_the_onset_frequency_of_collisions_is_the_frequency_of_the_first_impact(recordings, campaign):
     (onset,) = onsets(campaign.sweeps[0].analysis, TRUE)
     assert onset.frequency_hz == pytest.approx(recordings[2], abs=0.6)
     assert onset.low_m <= TRUE.gap_m <= onset.high_m
 
 
-def test_base_motion_from_collisions_does_not_bias_the_gap(campaign):
+def test_base_motion_caused_by_collisions_does_not_bias_the_gap(campaign):
     sweep = campaign.sweeps[0].analysis
     (before,) = onsets(sweep, TRUE)
     pushed = np.where(
@@ -157,16 +157,17 @@ def test_collisions_that_persist_when_the_level_is_lowered_give_no_upper_bound_o
     assert found.low <= 45e-6 <= found.high
 
 
-def test_a_fit_to_recordings_of_different_specimens_states_the_assumed_one(dwell_file, monkeypatch):
+def test_a_fit_to_recordings_of_different_specimens_states_the_assumed_specimen(dwell_file, monkeypatch):
     paths = [dwell_file("weak")]
     monkeypatch.setitem(synthetic.BENCH, "specimen", {**synthetic.BENCH["specimen"], "gap_m": 40e-6})
     found = update_model(analyse_files([*paths, dwell_file("strong")], "dwells", Simulation.LEFT_OUT))
     assert found.not_determined[0] == (
-        "The recordings describe different specimens; the fit takes them as one, described as in weak."
+        "The recordings describe different specimens; the fit takes them as one specimen, "
+        "described as in weak."
     )
 
 
-def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
+def test_dwells_below_and_above_the_onset_of_collisions_give_bounds_of_the_gap(dwell_file):
     results = analyse_files([dwell_file("weak"), dwell_file("strong")], "dwells", Simulation.LEFT_OUT)
     dwells = [each.analysis for each in results.dwells]
     (bracket,) = brackets(dwells, gong2025())
@@ -179,7 +180,7 @@ def test_dwells_below_and_above_the_onset_bracket_the_gap(dwell_file):
         (Parameter.GAP, bracket.low_m, bracket.high_m)
     ]
     with pytest.raises(NotEnoughData, match="one dwell below and one above"):
-        bracketed_gap(dwells[:1], gong2025())
+        onset_gap([], dwells[:1], gong2025())
 
 
 def test_the_lag_of_a_swept_response_is_predicted_from_the_sweep_rate():
@@ -211,7 +212,7 @@ def test_a_fit_to_missing_data_gives_a_one_sentence_error(campaign):
     with pytest.raises(NotEnoughData, match="no result"):
         update_model(CampaignResults("empty", (), ()))
     with pytest.raises(NotEnoughData, match="no sweep goes from"):
-        fit_gap([], gong2025())
+        onset_gap([], [], gong2025())
 
 
 def test_a_fit_whose_simulation_disagrees_with_the_recording_gives_no_values(campaign, fitted_model):

@@ -1,6 +1,7 @@
 """A recorded odd multisine separates even distortion, odd distortion and noise."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -8,8 +9,8 @@ import pytest
 from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import OddMultisine
 from vibench.analysis import analyse
-from vibench.analysis.figures.noise import distortion_caption, distortion_figure
-from vibench.analysis.frequency_response.distortion import distortion
+from vibench.analysis.figures.transmission import distortion_caption, distortion_figure
+from vibench.analysis.frequency_response.noise_response import distortion
 
 REPETITION_HZ, PERIODS, REALISATIONS, SETTLE_S = 4.0, 4, 4, 0.5
 NOISE_M_PER_S = 2e-5
@@ -22,6 +23,7 @@ def analyse_with(tmp_path_factory):
     `through` is the transmission, `base_gain` the base sensor's gain; both may vary by realisation.
     """
 
+    @cache
     def record_and_analyse(
         distorted,
         realisations=REALISATIONS,
@@ -64,6 +66,14 @@ def analyse_with(tmp_path_factory):
     return record_and_analyse
 
 
+def square(velocity):
+    return 0.05 * velocity**2
+
+
+def cube(velocity):
+    return 0.02 * velocity**3
+
+
 @pytest.mark.thorough
 def test_the_driven_spectral_lines_are_taken_from_the_plan_despite_drive_noise(analyse_with):
     quiet, noisy = (analyse_with(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
@@ -75,15 +85,14 @@ def test_the_driven_spectral_lines_are_taken_from_the_plan_despite_drive_noise(a
 
 
 @pytest.mark.thorough
-def test_a_square_nonlinearity_distorts_even_lines_and_a_cubic_one_odd_lines(analyse_with):
-    square = distortion(analyse_with(lambda velocity: 0.05 * velocity**2).response.periodic)
-    cube = distortion(analyse_with(lambda velocity: 0.02 * velocity**3).response.periodic)
-    noise = square.detection_noise_m_per_s
-    assert square.even_m_per_s > 20 * noise > 20 * square.odd_m_per_s / 3
-    assert cube.odd_m_per_s > 20 * noise > 20 * cube.even_m_per_s / 3
+def test_a_square_nonlinearity_distorts_even_lines_and_a_cubic_nonlinearity_distorts_odd_lines(analyse_with):
+    even, odd = (distortion(analyse_with(each).response.periodic) for each in (square, cube))
+    noise = even.detection_noise_m_per_s
+    assert even.even_m_per_s > 20 * noise > 20 * even.odd_m_per_s / 3
+    assert odd.odd_m_per_s > 20 * noise > 20 * odd.even_m_per_s / 3
     # A cubic term scatters the realisations; the noise is unchanged.
-    assert cube.distortion_share > 10 * cube.noise_share
-    assert cube.noise_share == pytest.approx(square.noise_share, rel=0.2)
+    assert odd.distortion_share > 10 * odd.noise_share
+    assert odd.noise_share == pytest.approx(even.noise_share, rel=0.2)
 
 
 def test_the_remainder_of_an_undistorted_response_is_only_the_added_noise(analyse_with):
@@ -125,8 +134,8 @@ def test_drift_between_realisations_is_not_reported_as_distortion(analyse_with, 
     "distorted",
     [
         np.zeros_like,
-        lambda v: 0.02 * v**3,
-        lambda v: 0.05 * v**2,
+        cube,
+        square,
         lambda v: 0.2 * v**3,  # few spectral lines scatter by less than 3 %
         lambda v: v * (np.abs(v) > 2.0),
     ],
@@ -135,8 +144,8 @@ def test_distortion_is_not_reported_as_drift(analyse_with, distorted):
     assert "Drift" not in [each.what for each in analyse_with(distorted).checks]
 
 
-def test_the_distortion_figure_shows_all_lines_and_its_caption_the_levels(analyse_with):
-    analysis = analyse_with(lambda velocity: 0.05 * velocity**2)
+def test_the_distortion_figure_shows_all_lines_and_its_caption_states_the_levels(analyse_with):
+    analysis = analyse_with(square)
     periodic = analysis.response.periodic
     drawn = distortion_figure(analysis, periodic)
     shares, quiet = drawn.figure.axes

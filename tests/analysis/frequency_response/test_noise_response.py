@@ -1,5 +1,6 @@
 """Resonances and transmission from streamed noise on the virtual rig match the closed forms."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,9 +10,9 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, StreamedNoise
 from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.analysis import NotEnoughData
-from vibench.analysis.frequency_response.noise_response import streamed_response
+from vibench.analysis.frequency_response.noise_response import implausible_static_ratio, streamed_response
 from vibench.analysis.recordings.channels import RecordedChannels
-from vibench.analysis.signals.confidence import phase_half_width
+from vibench.analysis.signals.averaging import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
@@ -66,11 +67,11 @@ def poles():
 
 
 @pytest.mark.parametrize("estimator", ["frequency_response", "h1", "h2"])
-def test_bounds_of_weak_noise_contain_the_exact_curve_at_95_percent_of_lines(responses, estimator):
+def test_the_bounds_from_weak_noise_contain_the_exact_curve_at_95_percent_of_lines(responses, estimator):
     found = getattr(responses[WEAK_VPP], estimator)
     truth = exact(found.frequency_hz)
     size = np.abs(truth)
-    # With a Hann window every third of some 1100 lines is independent: 1.2 % of scatter.
+    # With a Hann window, every third of some 1100 lines is independent: 1.2 % of scatter.
     held = (found.magnitude_lower <= size) & (size <= found.magnitude_upper)
     assert np.mean(held) == pytest.approx(0.95, abs=0.035)
     turned = np.abs(np.angle(truth / found.value)) <= phase_half_width(found.half_width)
@@ -89,7 +90,7 @@ def test_weak_noise_shows_the_three_true_resonances(responses):
             assert each.damping_ratio > damping_ratio
 
 
-def test_strong_noise_shows_the_two_terminal_resonances(responses):
+def test_strong_noise_shows_two_resonances_near_those_of_m1_joined_to_m2(responses):
     found = responses[STRONG_VPP].resonances
     # m1 and m2 are joined most of the time: slightly below the terminal 201.5 and 436.0 Hz.
     assert [each.frequency_hz for each in found] == [
@@ -102,10 +103,6 @@ def test_strong_noise_shows_the_two_terminal_resonances(responses):
 def test_the_base_level_of_noise_is_proportional_to_the_generator_voltage(responses):
     weak, strong = (responses[each].base_level.rms_acceleration for each in (WEAK_VPP, STRONG_VPP))
     assert strong / weak == pytest.approx(STRONG_VPP / WEAK_VPP, rel=0.05)
-
-
-def test_streamed_noise_has_no_periodic_response(responses):
-    assert all(each.periodic is None for each in responses.values())
 
 
 class Short:
@@ -132,3 +129,31 @@ class Short:
 def test_a_record_too_short_for_its_lowest_frequency_is_refused():
     with pytest.raises(NotEnoughData, match=r"0\.08 s of noise allow segments of 0\.017 s, .* 50 Hz"):
         streamed_response(Short(), noise(1.0, 0.08))
+
+
+@pytest.mark.parametrize("factor", [10.0, 2.0, 0.5, 0.1, -1.0])
+def test_a_wrong_scale_or_sign_shows_in_the_static_transmissibility(responses, factor):
+    for found in responses.values():
+        assert implausible_static_ratio(found) is None
+    weak = responses[WEAK_VPP]
+    lines = replace(weak.frequency_response, value=factor * weak.frequency_response.value)
+    assert implausible_static_ratio(replace(weak, frequency_response=lines)) == pytest.approx(factor, rel=0.2)
+
+
+@pytest.mark.parametrize("mode_hz", [90, 258, 265])
+def test_a_mode_that_was_not_found_does_not_suggest_a_wrong_scale(responses, mode_hz):
+    weak = responses[WEAK_VPP]
+    hz = weak.frequency_response.frequency_hz
+    modes = ((mode_hz, 0.3), (543, 0.5))
+    value = 1 + sum(part * hz**2 / (mode**2 - hz**2 + 2e-3j * mode * hz) for mode, part in modes)
+    lines = replace(weak.frequency_response, value=value, relative_sd_magnitude=np.full(hz.size, 0.01))
+    found = replace(weak, frequency_response=lines, resonances=weak.resonances[-1:])
+    assert implausible_static_ratio(found) is None
+
+
+def test_lines_too_close_to_show_a_static_transmissibility_give_none(responses):
+    weak = responses[WEAK_VPP]
+    lines = weak.frequency_response.between(50.0, 60.0)
+    for spacing_hz in (1e-3, 1e-6):
+        close = replace(lines, frequency_hz=70.0 + spacing_hz * np.arange(lines.frequency_hz.size))
+        assert implausible_static_ratio(replace(weak, frequency_response=close)) is None

@@ -128,7 +128,7 @@ def test_transmission_bounds_have_their_stated_coverage(count):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0])
+@pytest.mark.parametrize("sigma", [0.5, 2.0])
 def test_the_linear_gain_of_a_cubic_nonlinearity_matches_the_closed_form(sigma):
     """The linear gain of u + 0.1 u^3 for noise of variance s^2 is 1 + 0.3 s^2."""
     rng = np.random.default_rng(4)
@@ -157,7 +157,7 @@ def test_noise_on_the_base_does_not_bias_the_estimate_that_uses_the_drive_as_ref
     assert abs(np.mean(error.real)) < 4 / np.sqrt(orders.size)
 
 
-def test_bounds_of_one_realisation_are_marked_as_noise_only():
+def test_bounds_from_one_realisation_include_only_noise():
     orders = np.arange(5, 105)
     drive = multisine(orders, orders**2.0, 512, 2048)
     result = periodic_frequency_response([(drive, drive, drive)], RATE, repetition_hz=10.0)

@@ -4,11 +4,13 @@ import dataclasses
 import runpy
 from dataclasses import replace
 from pathlib import Path
+from threading import Event, Thread
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 from scipy import signal
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, resonances, transmissibility
 from vibench.analysis.frequency_response.periodic import PeriodicSums
@@ -18,7 +20,7 @@ from vibench.analysis.frequency_response.results import (
     converted_frequency_response,
 )
 from vibench.analysis.frequency_response.transmissibility import steady_relative_sd
-from vibench.analysis.signals.confidence import student_half_width
+from vibench.analysis.signals.averaging import student_half_width
 from vibench.analysis.signals.quantity import Quantity
 
 
@@ -79,7 +81,6 @@ def test_a_single_mode_is_recovered_exactly(natural_hz, damping):
     exact = 1 / (2 * damping * np.sqrt(1 - damping**2))
     assert found.peak_magnitude == pytest.approx(exact, rel=2e-3)
     assert found.peak_frequency_hz == pytest.approx(natural_hz * np.sqrt(1 - 2 * damping**2), abs=0.01)
-    assert found.quality_factor == pytest.approx(0.5 / damping, rel=1e-3)
     assert found.half_power_bandwidth_hz == pytest.approx(2 * damping * natural_hz, rel=2e-3)
 
 
@@ -105,7 +106,28 @@ def test_the_stated_uncertainties_of_a_resonance_match_the_scatter():
     assert np.mean([each.reduced_chi_square for each in found]) == pytest.approx(1, abs=0.1)
 
 
-def test_a_resonance_in_noise_is_found_and_its_resolution_is_checked():
+def blas_threads():
+    return max(each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas")
+
+
+def test_a_fit_uses_one_thread_of_linear_algebra_and_keeps_the_setting_of_the_program():
+    frequency_hz, found, is_over = np.arange(50, 500, 0.25), set(), Event()
+
+    def watch():
+        while not is_over.is_set():
+            found.add(blas_threads())
+
+    watcher = Thread(target=watch)
+    with threadpool_limits(2, "blas"):
+        watcher.start()
+        resonances(curve(frequency_hz, single(frequency_hz, 260.0, 0.01)), low_hz=60, high_hz=490)
+        is_over.set()
+        watcher.join()
+        assert 1 in found
+        assert blas_threads() == 2
+
+
+def test_a_resonance_in_noise_is_found_and_too_coarse_a_resolution_is_detected():
     rate, natural = 5120.0, 2 * np.pi * 260
     section = signal.bilinear([natural**2], [1, 2 * 0.02 * natural, natural**2], fs=rate)
     x, extra = np.random.default_rng(2).standard_normal((2, 600_000))
@@ -216,7 +238,7 @@ def test_a_band_with_too_few_lines_is_refused():
 
 
 @pytest.mark.thorough
-def test_frequency_and_damping_of_every_mode_are_within_bounds():
+def test_the_frequency_and_the_damping_of_every_mode_are_within_their_bounds():
     frequency_hz = np.arange(50.0, 601.0)
     exact = specimen(frequency_hz)
     # The absolute noise is equal on all lines; the mode at 500 Hz lies on the flanks of the others.
@@ -309,7 +331,7 @@ def test_correlated_spectral_lines_widen_the_bounds_of_a_resonance():
     assert together > 0.83 * draws
 
 
-def test_a_resonance_in_one_realisation_only_is_rejected():
+def test_a_resonance_found_in_only_one_realisation_is_rejected():
     frequency_hz = np.arange(100.0, 300.0)
     (found,) = resonances(curve(frequency_hz, single(frequency_hz, 200.0, 0.03)), low_hz=100, high_hz=300)
     assert scattered_resonances([found], [[found], [], []]) == ()
@@ -328,7 +350,7 @@ def test_leave_one_out_fits_with_another_number_of_modes_do_not_count_as_scatter
     assert 1.0 < widened.sd_frequency_hz < 2.0
 
 
-def test_frequency_and_damping_of_modes_are_exact_without_noise():
+def test_the_frequency_and_the_damping_of_modes_are_exact_without_noise():
     frequency_hz = np.arange(50.0, 601.0)
     found = resonances(curve(frequency_hz, specimen(frequency_hz)), low_hz=50, high_hz=600)
     natural_hz, damping = modes()

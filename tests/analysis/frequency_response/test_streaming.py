@@ -63,7 +63,7 @@ def test_a_four_times_longer_record_needs_no_more_memory():
 
 
 @pytest.mark.thorough
-def test_analysis_progress_reports_every_stage_and_its_completed_share(streamed_file):
+def test_the_progress_of_an_analysis_reports_every_stage_and_its_completed_share(streamed_file):
     heard = []
     analyse(streamed_file(), observer=heard.append)
     stages = ["streamed.h5: looking at every channel", "streamed.h5: analysing"]

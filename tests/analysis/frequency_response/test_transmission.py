@@ -43,7 +43,7 @@ def test_h1_h2_and_coherence_agree_with_scipy_given_the_same_windows(window, ove
 def test_the_block_size_does_not_change_the_transmission(cuts, overlap):
     rows = noise(3, 2, 5000)
     whole = transmissibility(rows[0], rows[1], RATE, segment_samples=128, overlap=overlap)
-    sums = FrequencyResponseSums(RATE, segment_samples=128, overlap=overlap)
+    sums = FrequencyResponseSums(whole.settings)
     edges = [0, *sorted(cuts), 5000]
     for start, stop in pairwise(edges):
         sums.add(rows[:, start:stop])
@@ -148,7 +148,7 @@ def test_gaps_in_the_samples_reduce_the_number_of_segments_but_not_the_coherence
 
 
 def test_gaps_in_the_samples_reduce_the_effective_number_of_averages():
-    """Without every second segment the half-overlapped segments are independent."""
+    """Without every second segment, the half-overlapped segments are independent."""
     x = noise(15, 10_000)
     valid = np.ones(x.size, dtype=bool)
     valid[1500::1000] = True
@@ -196,7 +196,7 @@ def test_channels_of_different_length_are_refused():
         transmissibility(noise(22, 1000), noise(23, 999), RATE, segment_samples=100)
 
 
-def test_a_spectral_line_without_drive_has_no_transmission_and_is_not_significant():
+def test_a_spectral_line_without_drive_signal_has_no_transmission_and_is_not_significant():
     time = np.arange(4000) / RATE
     x = np.sin(2 * np.pi * 128 * time)
     result = transmissibility(np.zeros_like(x), x, RATE, segment_samples=1000)

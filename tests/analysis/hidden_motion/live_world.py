@@ -8,7 +8,7 @@ import numpy as np
 from tests.analysis.hidden_motion import shaken_world
 from vibench.acquisition.rig import channels_of
 from vibench.analysis.hidden_motion import LiveTwin
-from vibench.virtual_rig.world.wiring import Coupling, Input
+from vibench.virtual_rig.world.conversion import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
 RATE_HZ = 51_200.0

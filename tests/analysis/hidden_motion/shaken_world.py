@@ -1,5 +1,6 @@
 """Recordings of the virtual rig with noise, and the true motion that no sensor measured."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from vibench.acquisition.recording import (
 )
 from vibench.acquisition.rig import Rig, channels_of, load_rig, specimen_of
 from vibench.sim import Specimen
-from vibench.virtual_rig.world.wiring import Coupling, Input
+from vibench.virtual_rig.world.conversion import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
 RIG = load_rig("virtual_rig")
@@ -157,8 +158,12 @@ def shake(
     rate_hz=51_200.0,
     specimen=None,
     further=None,
+    overflow=math.inf,
 ):
-    """Simulate a specimen on the virtual rig and write the converter's samples as a recording."""
+    """Simulate a specimen on the virtual rig and write the converter's samples as a recording.
+
+    The last channel overflows beyond ``overflow`` times its largest value.
+    """
     rig = noisy(noise, seed, dropouts_per_s)
     if further is not None:
         rig = with_sensor(rig, further)
@@ -170,6 +175,9 @@ def shake(
     )
     count = int(duration_s * rate_hz)
     volts = world.sample(inputs, rate_hz).read(count)
+    if math.isfinite(overflow):
+        most_v = overflow * np.abs(volts[-1]).max()
+        volts[-1] = (volts[-1] + most_v) % (2 * most_v) - most_v
     truth = world.truth()
     steps = GRID_HZ / rate_hz
     # Row n of the truth is the end of step n.

@@ -63,7 +63,7 @@ def test_the_usual_residual_of_the_twin_is_learnt_in_two_seconds():
     assert [watch.take(2.0) for _ in range(5)][-1]
 
 
-def test_a_baseline_file_is_stored_and_an_unreadable_one_is_ignored(tmp_path, monkeypatch, virtual_rig):
+def test_a_baseline_file_is_stored_and_an_unreadable_file_is_ignored(tmp_path, monkeypatch, virtual_rig):
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     path = baseline_path(virtual_rig, gong2025())
     assert path != baseline_path(virtual_rig, gong2025(gap_m=46e-6))

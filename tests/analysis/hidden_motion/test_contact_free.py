@@ -26,7 +26,7 @@ def impacts(spread, error_m=0.0, loss_s_per_m=0.0, count=400):
     )
 
 
-def test_impacts_that_differ_determine_the_gaps():
+def test_impacts_that_differ_from_each_other_determine_the_gaps():
     for gap in free_gaps(impacts(0.5, error_m=1e-7)):
         assert gap.value_m == pytest.approx(GAP_M, abs=2 * gap.sd_m)
         assert gap.sd_m < 0.3e-6

@@ -111,7 +111,7 @@ def test_the_live_twin_restarts_after_lost_samples(live_world):
     assert running.twin.newest.state is LiveState.TRACKED
 
 
-def test_untrackable_benches_and_specimens_are_refused(live_world, at_once):
+def test_benches_and_specimens_that_cannot_be_tracked_are_refused(live_world, at_once):
     rig = live_world(260.0, 1.5, 0.1, seed=1).rig
     rigid = replace(gong2025(), contact=RigidStops(0.8))
     with pytest.raises(InvalidRequest, match="cannot be tracked"):

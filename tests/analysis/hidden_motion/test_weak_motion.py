@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis.hidden_motion import hidden_motion_in_samples
-from vibench.analysis.hidden_motion._parameters import Hidden, value_of
-from vibench.analysis.hidden_motion._tracking_model import tracked_specimen
+from vibench.analysis.hidden_motion._tracking_model import Hidden, tracked_specimen, value_of
 from vibench.sim import gong2025
 
 RATE_HZ, SAMPLES = 51_200.0, 61_440
@@ -70,7 +69,7 @@ def coverage(found):
     return [each.low <= value_of(true, what) <= each.high for what, each in found.items()]
 
 
-@pytest.mark.parametrize("factor", [1.0, 1.5, 0.7])
+@pytest.mark.parametrize("factor", [1.5, 0.7])
 def test_channel_noise_alone_determines_no_parameter_of_the_specimen(factor):
     assert not estimate(np.random.default_rng(2), np.zeros(SAMPLES // 2 + 1, dtype=complex), (1, factor, 1))
 

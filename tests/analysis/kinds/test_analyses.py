@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition.plan import EXCITATION_KINDS, Family, rows_by_kind
-from vibench.analysis.kinds.analyses import ANALYSES
+from vibench.analysis.kinds import ANALYSES
 from vibench.analysis.report import DRAWINGS
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis.live import LevelVerdict
-from vibench.analysis.live._levels import HOLD_S, LevelMeters
+from vibench.analysis.live._ring import HOLD_S, LevelMeters
 
 RATE = 1000.0
 

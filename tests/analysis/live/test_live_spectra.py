@@ -79,7 +79,7 @@ def test_one_segment_gives_a_spectrum_but_no_transmission():
     assert spectra.frequency_response((0, 1), low_hz=100.0, high_hz=1000.0) is None
 
 
-def test_rejected_segments_are_excluded_and_later_ones_counted():
+def test_rejected_segments_are_excluded_and_later_segments_are_counted():
     rng = np.random.default_rng(5)
     spectra = live_spectra(rng.standard_normal((2, 10_000)), 1000)
     spectra.add(np.full((2, 2000), 1e6, dtype=np.float32))

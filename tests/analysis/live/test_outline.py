@@ -66,7 +66,7 @@ def test_lost_samples_stay_empty_and_silence_stays_zero_in_an_outline():
 @pytest.mark.parametrize(("start_hz", "stop_hz", "span_s"), [(150, 350, 8.2), (20, 600, 8.2), (350, 60, 4.0)])
 @pytest.mark.parametrize("columns", [500, 1000, 1800, 1960])
 def test_the_outline_of_a_steady_sweep_has_edges_without_notches(start_hz, stop_hz, span_s, columns):
-    """With the period of the sweep's middle the edges once fell to half at its slow end."""
+    """With the period of the sweep's middle, the edges once fell to half at its slow end."""
     time_s = np.arange(round(span_s * RATE_HZ)) / RATE_HZ
     hz = start_hz + (stop_hz - start_hz) * time_s / span_s
     phase = 2 * np.pi * (start_hz * time_s + 0.5 * (stop_hz - start_hz) * time_s**2 / span_s)

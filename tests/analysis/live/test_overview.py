@@ -71,7 +71,7 @@ def test_lost_samples_leave_a_gap_in_the_overview_picture(recording):
     assert np.isfinite(picture.low).mean() > 0.97
 
 
-def test_a_file_without_an_overview_gives_the_same_picture(recording, tmp_path):
+def test_an_overview_picture_is_the_same_if_the_file_has_no_overview(recording, tmp_path):
     path = tmp_path / "old.h5"
     shutil.copyfile(recording.path, path)
     with h5py.File(path, "r+") as file:

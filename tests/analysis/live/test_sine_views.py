@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.live._portrait import PoincareSection, portrait, portrait_samples
 from vibench.analysis.live._ring import RingWindow
 from vibench.analysis.live._sine_response import (
+    PoincareSection,
     drive_tone,
     drive_turns,
     look_samples,
+    portrait,
+    portrait_samples,
     sine_point,
     stretch_samples,
 )
@@ -58,7 +60,7 @@ def test_a_live_point_has_the_responses_of_a_known_motion(frequency_hz):
     assert point.lower == pytest.approx(A0 * omega * slope.min(), rel=2e-3)
 
 
-def test_a_live_point_of_a_sweep_has_the_frequency_at_its_time():
+def test_a_live_point_of_a_sweep_has_the_frequency_of_the_sweep_at_that_time():
     time_s = np.arange(int(2 * RATE)) / RATE
     phase = 2 * np.pi * (255.0 * time_s + 0.5 * 2.0 * time_s**2)
     window = RingWindow(0, motion(phase, 2 * np.pi * (255.0 + 2.0 * time_s)).astype(np.float32))

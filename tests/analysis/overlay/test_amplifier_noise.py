@@ -32,7 +32,7 @@ def noise_power(acceleration, rate_hz):
 
 
 @pytest.mark.thorough
-def test_draws_of_the_twin_include_amplifier_noise_that_was_not_recorded(recording):
+def test_simulated_draws_of_the_twin_include_amplifier_noise_that_was_not_recorded(recording):
     """Without it the simulated base has 0.7 times the noise, and limits of weak motions are too narrow."""
     source = voltage_source(recording, specimen_of(RIG), draws=8)
     rate_hz = recording.sample_rate_hz

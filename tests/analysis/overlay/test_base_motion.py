@@ -57,7 +57,7 @@ def test_the_lowest_played_frequency_sets_the_lower_band_edge(plan, lowest_hz):
     assert lowest_frequency_hz(Measurement(name="m", excitation=plan)) == lowest_hz
 
 
-def test_a_simulation_in_pieces_equals_one_simulation_of_the_whole(dwell_motions):
+def test_a_simulation_made_in_pieces_equals_a_simulation_made_at_once(dwell_motions):
     base = np.tile(dwell_motions["weak"][0].displacement_m[round(4 * RATE) :], 8)[: round(7 * RATE)]
     base = base * np.clip(np.arange(base.size) / RATE, 0, 1)
     velocity, impacts = shake_specimen(gong2025(), base, RATE)

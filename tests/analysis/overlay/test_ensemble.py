@@ -48,8 +48,7 @@ def test_random_magnitudes_exceed_the_limit_in_1_percent_of_cases():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("scatter", [0.01, 0.5, 1.5, 9.0])
-@pytest.mark.parametrize("middle", [0.3, np.pi])
+@pytest.mark.parametrize(("scatter", "middle"), [(0.01, np.pi), (0.5, 0.3), (1.5, np.pi), (9.0, 0.3)])
 def test_correct_phases_exceed_the_limit_in_1_percent_of_cases_on_the_whole_circle(scatter, middle):
     rng, outside = np.random.default_rng(2), 0
     for _ in range(1000):
@@ -79,10 +78,11 @@ def long_tails(rng, size):
     return np.abs(1 + 0.02 * rng.standard_t(5, size))
 
 
-@pytest.mark.parametrize("drawn", [rare_dips, long_tails])
-@pytest.mark.parametrize(("draws", "points"), [(8, 200), (16, 1000)])
+@pytest.mark.parametrize(
+    ("drawn", "draws", "points"), [(rare_dips, 16, 1000), (long_tails, 8, 200), (long_tails, 16, 1000)]
+)
 def test_long_tailed_values_exceed_the_limit_in_1_percent_of_cases(drawn, draws, points):
-    """With a limit for normally distributed values 14 to 100 % would lie outside."""
+    """With a limit for normally distributed values, 14 to 100 % would lie outside."""
     rng, outside = np.random.default_rng(6), 0
     for _ in range(100):
         values = drawn(rng, (draws + 1, points))
@@ -90,7 +90,7 @@ def test_long_tailed_values_exceed_the_limit_in_1_percent_of_cases(drawn, draws,
     assert outside <= 6
 
 
-@pytest.mark.parametrize("draws", [5, 8, 16, 48, 200])
+@pytest.mark.parametrize("draws", [5, 16, 200])
 def test_limits_estimated_from_few_draws_are_exceeded_in_1_percent_of_cases(draws):
     """With the quantile of the fitted distribution 4.8, 3.1, 2.0, 1.3 and 1.1 % would exceed the limit."""
     largest = np.random.default_rng(10).gumbel(3.7, 0.3, (20000, draws + 1))
@@ -202,7 +202,7 @@ def test_half_of_the_draws_are_enough_for_a_clear_verdict(shift):
         (8, 0.0, 4, 20),
     ],
 )
-def test_drawing_stops_at_clear_agreement_or_if_too_few_draws_are_alike(requested, shift, alike_each, made):
+def test_sampling_stops_at_clear_agreement_or_if_too_few_draws_are_alike(requested, shift, alike_each, made):
     def estimate(number):
         value = np.exp(0.1 * np.random.default_rng(number).standard_normal(3))
         state = np.full(3, (number + 1) % alike_each)
@@ -212,4 +212,4 @@ def test_drawing_stops_at_clear_agreement_or_if_too_few_draws_are_alike(requeste
     source = DrawSource(run, requested, 1000, lambda number: number)
     measured = Quantity("q", FREQUENCY_HZ[:3], np.exp(shift * np.ones(3)), np.zeros(3, dtype=np.int64))
     found = all_draws(source, estimate, [measured])
-    assert (found.run.draws, len(found.quantities), found.response) == (made, made, 0)
+    assert (found.run.draws, len(found.ensemble[0].draws), found.response) == (made, made, 0)

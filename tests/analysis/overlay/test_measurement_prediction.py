@@ -9,7 +9,7 @@ from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import Measurement, SineSweep, base_motion, predicted_loads
 from vibench.acquisition.rig import BaseQuantity, load_rig
 from vibench.analysis import predict_measurement
-from vibench.analysis.overlay.measurement_prediction import bands_of
+from vibench.analysis.overlay.overlay import bands_of
 
 ROOT = Path(__file__).resolve().parents[3]
 QUICK = {each.name: each for each in load_campaign(ROOT / "campaigns" / "quick.toml").measurements}
@@ -20,10 +20,6 @@ def test_collision_bands_extend_halfway_to_the_next_point():
     frequency_hz = np.array([10.0, 20.0, 30.0, 40.0, 50.0])
     inside = np.array([True, False, True, True, False])
     assert bands_of(frequency_hz, inside) == ((10.0, 15.0), (25.0, 45.0))
-
-
-def test_without_colliding_points_there_is_no_collision_band():
-    assert bands_of(np.array([10.0, 20.0]), np.array([False, False])) == ()
 
 
 def test_the_predicted_base_amplitude_of_a_dwell_is_the_predicted_stroke_of_its_plan():

@@ -8,8 +8,14 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.analysis import analyse
 from vibench.analysis.overlay.ensemble import logarithmic_difference
-from vibench.analysis.overlay.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude
-from vibench.analysis.overlay.prediction import paper_amplitude_m, predict
+from vibench.analysis.overlay.overlay import (
+    DwellOverlay,
+    NoiseOverlay,
+    SweepOverlay,
+    equivalent_amplitude,
+    paper_amplitude_m,
+    predict,
+)
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import base_transmissibility, gong2025
 

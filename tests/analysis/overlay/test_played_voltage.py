@@ -22,7 +22,7 @@ def level(volts, low_hz=240.0, high_hz=290.0):
 
 @pytest.mark.parametrize(("played_rms", "own_rms"), [(5e-4, 4e-4), (2e-4, 4e-4), (5e-4, 1e-4)])
 def test_converter_noise_is_removed_from_the_drive_of_the_twin(played_rms, own_rms):
-    """With converter noise in the drive a weak dwell was once 2 standard deviations off."""
+    """With converter noise in the drive, a weak dwell was once 2 standard deviations off."""
     rng = np.random.default_rng(5)
     wanted, found, recorded = [], [], []
     for _ in range(12):
@@ -38,7 +38,7 @@ def test_converter_noise_is_removed_from_the_drive_of_the_twin(played_rms, own_r
         assert np.mean(recorded) > 1.4 * np.mean(wanted)
 
 
-def test_draws_keep_the_recorded_drive_within_its_uncertainty():
+def test_simulated_draws_keep_the_recorded_drive_within_its_uncertainty():
     rng = np.random.default_rng(6)
     volts = TONE_V + 1e-4 * rng.standard_normal(TIME_S.size)
     voltage = PlayedVoltage(volts, 1e-4)

@@ -53,7 +53,7 @@ def test_a_larger_threshold_never_finds_fewer_similar_points(first, second, seed
     )
 
 
-def test_similarity_leaves_out_points_without_a_value_and_counts_them():
+def test_points_without_a_value_are_left_out_of_the_similarity_and_counted():
     found = similarity(curve([2.0, np.nan, 2.0, 2.0]), curve([2.0, 2.0, np.nan, 0.2]))
     assert (found.left_out, found.rate) == (2, 0.5)
     with pytest.raises(NotEnoughData, match="no frequency"):

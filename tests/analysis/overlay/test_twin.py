@@ -8,13 +8,13 @@ import pytest
 
 from tests.analysis.virtual_measurements import record, sampled_at, weak_noise
 from vibench.acquisition import open_recording
-from vibench.acquisition.plan import Dwell
+from vibench.acquisition.plan import Dwell, SineSweep
 from vibench.analysis import Simulation, analyse, result_summary
 from vibench.analysis.figures.dwells import dwells_figure
-from vibench.analysis.kinds.analysis_kind import Result
-from vibench.analysis.overlay.driven_rig import Driven
+from vibench.analysis.figures.sweep import sweep_figure
+from vibench.analysis.kinds import Result
+from vibench.analysis.overlay.driven_rig import Driven, fit_shaker
 from vibench.analysis.overlay.overlay import PHASE
-from vibench.analysis.overlay.shaker_fit import fit_shaker
 from vibench.analysis.recordings.channels import ALIGNMENT_ERRORS
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
@@ -66,6 +66,17 @@ def test_a_twin_with_a_wrong_gap_disagrees_with_the_measurement(recordings):
     assert not found.quantity("Response II").agrees
 
 
+def test_a_sweep_with_nothing_to_compare_has_a_caption_without_missing_numbers(tmp_path):
+    """Within 1 s of the edge of a collision region, nothing is compared."""
+    sweep = SineSweep(amplitude_vpp=0.5, start_hz=220, stop_hz=310, duration_s=2, step_s=0.2, settle_s=0.5)
+    record(tmp_path / "sweep.h5", sweep, sampled_at(25_600.0))
+    found = twin_of(tmp_path / "sweep.h5")
+    outside = found.overlay.difference.where(~found.analysis.collisions.is_colliding)
+    assert outside.decibel.size
+    assert np.isnan(outside.decibel).all()
+    assert "nan" not in sweep_figure(found.analysis, found.overlay).caption
+
+
 def test_the_twin_agrees_with_weak_noise_on_every_line(recordings):
     found = twin_of(recordings / "noise.h5").overlay
     assert found.run.draws == 8
@@ -100,7 +111,7 @@ def test_the_phase_bound_contains_the_error_of_times_with_few_digits(recordings)
     assert all(each.agrees for each in found.ensemble)
 
 
-def test_json_and_figures_show_the_draws(chaotic_dwell):
+def test_the_json_output_and_the_figures_show_the_draws(chaotic_dwell):
     said = json.loads(json.dumps(result_summary(chaotic_dwell)))["simulated"]
     assert said["drive"] == "recorded amplifier voltage"
     assert [each["quantity"] for each in said["ensemble"][:2]] == ["Response I", "Response II"]

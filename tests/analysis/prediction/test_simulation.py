@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.analysis.prediction.accuracy_cost import MEASURED, cost_sentences
 from vibench.analysis.prediction.progress import (
+    MEASURED,
     SimulatedPoint,
     SimulationProgress,
     SimulationRequest,
     Trouble,
+    cost_sentences,
 )
 from vibench.analysis.prediction.worker import answer, simulate
 from vibench.sim import Accuracy, base_transmissibility, gong2025, load_specimen
@@ -42,7 +43,7 @@ def test_a_model_that_is_named_twice_is_simulated_once():
     assert SimulationRequest(step_hz=50.0).points == 24
 
 
-def test_a_result_computed_point_by_point_ends_as_the_linear_transmission():
+def test_a_result_computed_point_by_point_equals_the_linear_transmission_at_the_end():
     request = SimulationRequest(**LINEAR)
     progress, counts = SimulationProgress(request.amplitude_m, request.points, "n"), []
     simulate(request, lambda parts: (progress.add(parts), counts.append(progress.done)), lambda: False, 2)
@@ -56,7 +57,7 @@ def test_a_result_computed_point_by_point_ends_as_the_linear_transmission():
     assert trace.name == "model linear, 5 µm, Response II, predicted"
 
 
-def test_the_simulation_uses_the_specimen_given_by_name_or_file(tmp_path):
+def test_the_simulation_uses_the_specimen_given_by_a_name_or_a_file(tmp_path):
     """Shipped specimens are given by name, other specimens by file."""
     file = tmp_path / "own.toml"
     file.write_text(
@@ -154,7 +155,7 @@ def test_a_short_request_completes_after_a_long_request_is_dropped():
     assert second[-1] is None
 
 
-def test_a_requested_error_overrides_accuracy_and_duration():
+def test_a_target_error_overrides_accuracy_and_duration():
     request = SimulationRequest(**LINEAR, error="1 %", time_s="2 s", accuracy="quick", duration_s=4.0)
     assert request.study.target is not None
     assert (request.study.error, request.study.time_s, request.study.accuracy) == (0.01, 2.0, "standard")

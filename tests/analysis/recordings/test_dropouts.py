@@ -133,7 +133,7 @@ def test_long_drop_outs_are_not_bridged():
     assert find_dropouts(with_drop_out(motion(8), 20_000, 2_000, 0.0), RATE_HZ) == ()
 
 
-def test_drop_outs_are_not_searched_below_20_khz():
+def test_drop_outs_are_not_searched_for_below_a_sample_rate_of_20_khz():
     assert find_dropouts(with_drop_out(motion(9), 20_000, 12, 0.8), 19_000.0) == ()
 
 
@@ -153,7 +153,7 @@ def test_bridged_drop_outs_do_not_change_the_results_of_a_dwell(tmp_path):
     assert dark.response_i == pytest.approx(light.response_i, rel=2e-3)
     assert dark.response_ii == pytest.approx(light.response_ii, abs=4 * light.sd_response_ii)
     checks = {each.what: each for each in results[1].checks}
-    assert "the vibrometer lost its light" in checks["Drop-outs"].text
+    assert "the vibrometer lost its signal" in checks["Drop-outs"].text
     assert checks["Overloads"].verdict is Verdict.PASSED
 
 
@@ -169,7 +169,7 @@ def test_clustered_drop_outs_change_no_reported_result_of_a_dwell(tmp_path, drop
     if done.results:
         assert done.results[0].analysis.response.response_i == pytest.approx(3.21, rel=0.02)
     else:
-        assert "lost its light" in done.failures[0].sentence
+        assert "lost its signal" in done.failures[0].sentence
 
 
 @pytest.mark.thorough
@@ -235,7 +235,7 @@ def test_no_collision_of_a_shipped_specimen_is_reported_as_a_drop_out(tmp_path, 
 
 
 @pytest.mark.thorough
-def test_drop_outs_in_a_part_of_a_recording_are_bridged_as_in_the_whole(tmp_path):
+def test_drop_outs_in_a_part_of_a_recording_are_bridged_as_in_the_whole_recording(tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
     with open_recording(measure(RIG, plan, tmp_path / "d.h5", 8.0)) as recording:
         whole = BridgedChannel(recording, ROLE).read(0, recording.samples)
@@ -249,14 +249,14 @@ def test_drop_outs_in_a_part_of_a_recording_are_bridged_as_in_the_whole(tmp_path
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("rate_hz", [1e-6, 0.4, 1e12])
-def test_an_unusual_sampling_rate_is_accepted(tmp_path, rate_hz):
+def test_an_unusual_sampling_rate_is_accepted(tmp_path):
     plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=1)
     path = measure(RIG, plan, tmp_path / "d.h5", 0.0)
-    with h5py.File(path, "r+") as file:
-        file.attrs["sample_rate_hz"] = rate_hz
-    with open_recording(path) as recording:
-        assert BridgedChannel(recording, ROLE).between(0, recording.samples) == ()
+    for rate_hz in (1e-6, 0.4, 1e12):
+        with h5py.File(path, "r+") as file:
+            file.attrs["sample_rate_hz"] = rate_hz
+        with open_recording(path) as recording:
+            assert BridgedChannel(recording, ROLE).between(0, recording.samples) == (), rate_hz
 
 
 @pytest.mark.thorough

@@ -7,14 +7,14 @@ from tests.analysis.conftest import A0_STRONG, A0_WEAK, DWELL_PART, dwell_plan, 
 from vibench.acquisition import Overload, open_recording
 from vibench.analysis import analyse
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.recordings.channel_levels import channel_levels
-from vibench.analysis.recordings.channels import RecordedChannels
-from vibench.analysis.recordings.response import (
+from vibench.analysis.recordings.channels import (
+    RecordedChannels,
     ResponseChannel,
     derivative_kernel,
     integral_kernel,
     noise_as_read,
 )
+from vibench.analysis.recordings.facts import channel_levels
 
 RATE = synthetic.RATE
 ACCELERATION = ("m0_acceleration", "acceleration", "m s-2", 100.0)
@@ -49,7 +49,7 @@ def sensor_file(dwell_motions, tmp_path):
 
 @pytest.mark.parametrize("rate_hz", [5120.0, 51200.0])
 @pytest.mark.parametrize("kernel", [integral_kernel, derivative_kernel])
-def test_integral_and_derivative_kernels_are_exact_from_5_hz_to_0_4_of_rate(kernel, rate_hz):
+def test_integral_and_derivative_kernels_are_exact_from_5_hz_to_0_4_times_the_sample_rate(kernel, rate_hz):
     weights = kernel(rate_hz)
     turn = 2 * np.pi * np.geomspace(5.0, 0.4 * rate_hz, 60)
     lags = np.arange(weights.size) - weights.size // 2

@@ -27,8 +27,8 @@ def result_with(*ensemble, by_voltage=True, why=""):
         (result_with(GOOD), None, Agreement.YES, ""),
         (result_with(GOOD, OPEN), None, Agreement.YES, "1 of 2 quantities were compared"),
         (result_with(GOOD, BAD, OPEN), None, Agreement.NO, "outside of the simulated draws: Response I"),
-        (result_with(OPEN), None, Agreement.OPEN, "too few draws have the same kind of motion as measured"),
-        (result_with(), None, Agreement.OPEN, "too few draws have the same kind of motion as measured"),
+        (result_with(OPEN), None, Agreement.OPEN, "the same kind of motion as the measurement"),
+        (result_with(), None, Agreement.OPEN, "the same kind of motion as the measurement"),
         (
             result_with(GOOD, by_voltage=False),
             None,
@@ -45,14 +45,14 @@ def result_with(*ensemble, by_voltage=True, why=""):
         (Of(overlay=None), NOT_SIMULATED, Agreement.OPEN, "it did not reach its end"),
     ],
 )
-def test_agreement_names_the_compared_quantities(result, failure, agreement, reason):
+def test_the_agreement_verdict_names_the_compared_quantities(result, failure, agreement, reason):
     found, said = agreement_of(result, failure)
     assert found is agreement
     assert said.endswith(reason)
     assert bool(said) is bool(reason)
 
 
-def test_a_report_with_only_failures_names_each_with_its_reason(tmp_path):
+def test_a_report_with_only_failures_names_every_failure_with_its_reason(tmp_path):
     failed = tuple(AnalysisFailure(f"{each}.h5", FailedStep.ANALYSIS, f"{each} is cut") for each in "ab")
     page = Page(write_report(CampaignResults("x", (), failed), tmp_path / "x.html").read_text("utf-8"))
     assert page.findings == "Two recordings of two gave no result."

@@ -40,7 +40,7 @@ def test_html_in_text_from_files_is_escaped_everywhere_in_a_report(tmp_path):
     assert Read(text).visible.count(HOSTILE) >= 9
 
 
-def test_reports_have_dark_and_print_styles_and_do_not_print_closed_folds(tmp_path):
+def test_reports_have_a_dark_style_and_a_print_style_and_do_not_print_closed_folds(tmp_path):
     style = page_text(tmp_path, ())
     assert "@media (prefers-color-scheme: dark)" in style
     assert "@page { size: A4" in style

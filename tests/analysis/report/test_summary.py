@@ -7,6 +7,7 @@ import pytest
 
 from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.report import Agreement
+from vibench.analysis.report._drawings import noise_findings
 from vibench.analysis.report._report import MOST_WORDS, summary
 from vibench.analysis.results.campaign_results import AnalysisFailure, FailedStep
 
@@ -45,8 +46,8 @@ def test_the_campaign_of_the_paper_is_reported_in_three_findings():
         (dwell(0.05, MotionKind.PERIODIC), dwell(1.5, MotionKind.CHAOTIC), dwell(10.0, MotionKind.CHAOTIC)),
     )
     assert summary(results, [YES] * 6) == (
-        "At 0.05 Vpp there are three resonances, 94.6, 266.2 and 499.6 Hz. "
-        "At 10 Vpp they disappear, and two new ones appear at 199.1 and 428.5 Hz. "
+        "At 0.05 Vpp there are three resonances, at 94.6, 266.2 and 499.6 Hz. "
+        "At 10 Vpp these resonances disappear, and two new ones appear at 199.1 and 428.5 Hz. "
         "At 260 Hz the motion is periodic at 0.05 Vpp and chaotic at 1.5 and 10 Vpp. "
         "The simulation agrees with all six recordings."
     )
@@ -58,14 +59,19 @@ def test_the_campaign_of_the_paper_is_reported_in_three_findings():
         (noise(10.0, 94.5, 266.0), "At 10 Vpp, 94.5 and 266.0 Hz remain; 499.6 Hz disappears."),
         (noise(10.0, 95.0, 266.0, 499.0), "At 10 Vpp, 95.0, 266.0 and 499.0 Hz remain."),
         (noise(10.0), "At 10 Vpp there is no significant resonance."),
-        (noise(10.0, 199.0), "At 10 Vpp they disappear, and a new one appears at 199.0 Hz."),
-        (noise(10.0, *range(110, 240, 10)), "At 10 Vpp they disappear, and 13 new ones appear at 110.0"),
+        (noise(10.0, 199.0), "At 10 Vpp these resonances disappear, and a new one appears at 199.0 Hz."),
+        (noise(10.0, *range(110, 240, 10)), "these resonances disappear, and 13 new ones appear at 110.0"),
         (noise(10.0, 266.0, 428.0), "266.0 Hz remains; 94.6 and 499.6 Hz disappear; 428.0 Hz is new."),
-        (noise(10.0, 199.0, band_hz=(150.0, 300.0)), "At 10 Vpp there is one resonance, 199.0 Hz."),
+        (noise(10.0, 199.0, band_hz=(150.0, 300.0)), "At 10 Vpp there is one resonance, at 199.0 Hz."),
     ],
 )
 def test_measured_changes_of_resonances_are_reported(strong, words):
     assert words in report(noise=(noise(0.05, 94.6, 266.2, 499.6), strong))
+
+
+def test_the_summary_of_noise_without_a_resonance_states_which_modes_may_be_missed():
+    (finding,) = noise_findings(noise(10.0, band_hz=np.arange(50.0, 600.0, 0.5)))
+    assert finding.endswith("resonance; lines are 0.5 Hz apart, narrower modes may be missed.")
 
 
 @pytest.mark.parametrize(

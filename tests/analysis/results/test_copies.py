@@ -9,7 +9,7 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import ResultArray
 from vibench.analysis import Simulation, analyse_files, campaign_summary, compare_recording, recordings_in
-from vibench.analysis.frequency_response.request import FrequencyResponseRequest
+from vibench.analysis.frequency_response.results import FrequencyResponseRequest
 from vibench.analysis.report import check_warnings
 from vibench.analysis.report._comparison_export import write_comparison
 

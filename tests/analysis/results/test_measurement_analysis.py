@@ -1,10 +1,14 @@
 """Analyses of a known specimen match the closed form and report missing or faulty data."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from tests.analysis import synthetic_recordings as synthetic
+from tests.analysis.conftest import A0_WEAK, DWELL_PART, dwell_plan
+from vibench.acquisition.plan import StreamedNoise
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import NotEnoughData, analyse
@@ -27,27 +31,32 @@ def verdict(analysis, what):
     return next(each.verdict for each in analysis.checks if each.what == what)
 
 
-def test_analyse_accepts_a_recording_as_path_or_text(dwell_file):
+@pytest.fixture(scope="module")
+def weak(dwell_file):
+    """Analysis of a weak dwell, without collisions and without faults."""
+    return analyse(dwell_file("weak"))
+
+
+def test_the_function_analyse_accepts_a_recording_as_a_path_or_as_text(dwell_file):
     path = dwell_file("weak")
     assert analyse(str(path)).response.response_ii == analyse(path).response.response_ii
 
 
-def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(dwell_file):
-    found = analyse(dwell_file("weak"))
-    assert isinstance(found, DwellAnalysis)
-    assert found.response.drive.frequency_hz == pytest.approx(260.0, rel=1e-8)
-    assert found.response.drive.amplitude_m == pytest.approx(0.5e-6, rel=1e-4)
+def test_a_weak_dwell_matches_the_closed_form_in_amplitude_and_phase(weak):
+    assert isinstance(weak, DwellAnalysis)
+    assert weak.response.drive.frequency_hz == pytest.approx(260.0, rel=1e-8)
+    assert weak.response.drive.amplitude_m == pytest.approx(0.5e-6, rel=1e-4)
     exact = truth(260.0)[0]
-    assert found.response.response_ii == pytest.approx(abs(exact), rel=1e-3)
+    assert weak.response.response_ii == pytest.approx(abs(exact), rel=1e-3)
     # Without collisions both responses are equal, except for the sampling of the maximum.
-    assert found.response.response_i == pytest.approx(found.response.response_ii, rel=1e-2)
-    # Without correction the channel's delay of one sample would add 14.6 degrees.
-    assert found.response.phase_rad == pytest.approx(np.angle(exact), abs=2e-3)
+    assert weak.response.response_i == pytest.approx(weak.response.response_ii, rel=1e-2)
+    # Without correction, the channel's delay of one sample would add 14.6 degrees.
+    assert weak.response.phase_rad == pytest.approx(np.angle(exact), abs=2e-3)
 
 
 @pytest.mark.thorough
-def test_a_colliding_dwell_has_a_lower_response_ii_and_more_response_in_terminal_bands(dwell_file):
-    weak, strong = analyse(dwell_file("weak")), analyse(dwell_file("strong"))
+def test_a_colliding_dwell_has_a_lower_response_ii_and_more_response_in_terminal_bands(weak, dwell_file):
+    strong = analyse(dwell_file("strong"))
     assert strong.response.response_ii < 0.3 * weak.response.response_ii
     assert strong.response.response_i > 2 * strong.response.response_ii
     for quiet, loud in zip(weak.terminal, strong.terminal, strict=True):
@@ -105,7 +114,7 @@ def test_a_recording_that_ended_before_its_dwell_is_refused_with_the_reason(dwel
         analyse(path)
 
 
-def test_a_dwell_with_lost_samples_is_refused_with_their_number(dwell_file):
+def test_a_dwell_with_lost_samples_is_refused_with_the_number_of_lost_samples(dwell_file):
     path = dwell_file("weak", hole=(round(3 * RATE), round(3 * RATE) + 40))
     with pytest.raises(UnusableData, match="40 of 19200 samples were lost"):
         analyse(path)
@@ -125,11 +134,40 @@ def test_a_realisation_with_lost_samples_is_excluded(noise_file):
     )
 
 
-def test_a_faultless_recording_passes_its_checks(dwell_file):
-    found = analyse(dwell_file("weak"))
-    assert {each.verdict for each in found.checks} <= {Verdict.PASSED, Verdict.NOTE}
-    assert verdict(found, "Calibration") is Verdict.PASSED
-    assert verdict(found, "Drive frequency") is Verdict.PASSED
+def test_a_faultless_recording_passes_its_checks(weak):
+    assert {each.verdict for each in weak.checks} <= {Verdict.PASSED, Verdict.NOTE}
+    assert verdict(weak, "Calibration") is Verdict.PASSED
+    assert verdict(weak, "Drive frequency") is Verdict.PASSED
+
+
+def test_a_gain_that_changes_during_a_dwell_is_reported(dwell_motions, tmp_path):
+    """The report stated "periodic" and the mean of two gains, without a warning."""
+    base, velocity, _ = dwell_motions["weak"]
+    gain = np.where(np.arange(velocity.size) < 0.7 * velocity.size, 1.0, 2.0)
+    base = replace(base, acceleration=gain * base.acceleration)
+    found = analyse(synthetic.write_recording(tmp_path, dwell_plan(A0_WEAK), base, velocity, [DWELL_PART]))
+    assert verdict(found, "Dwell settled") is Verdict.WARNING
+
+
+def test_a_line_below_the_evaluated_band_is_reported(dwell_motions, tmp_path):
+    """The report stated "periodic" and a tenth of the largest displacement, without a warning."""
+    base, velocity, _ = dwell_motions["weak"]
+    slow = 0.3 * np.max(velocity) * np.sin(2 * np.pi * 260 / 37 * np.arange(velocity.size) / RATE)
+    path = synthetic.write_recording(tmp_path, dwell_plan(A0_WEAK), base, velocity + slow, [DWELL_PART])
+    said = next(each for each in analyse(path).checks if each.what == "Slow motion")
+    assert said.verdict is Verdict.WARNING
+    assert said.text.startswith("motion at 7 Hz")
+
+
+def test_a_dwell_whose_drive_has_another_frequency_is_refused(dwell_motions, tmp_path):
+    """The report stated a level of nanometres and a Response I of thousands, from noise at 75 Hz."""
+    base, velocity, _ = dwell_motions["weak"]
+    weaker = 1e-3 * A0_WEAK * np.sin(2 * np.pi * 130.0 * np.arange(velocity.size) / RATE)
+    base = replace(base, displacement_m=base.displacement_m + weaker)
+    plan = dwell_plan(A0_WEAK).model_copy(update={"frequency_hz": 130.0})
+    path = synthetic.write_recording(tmp_path, plan, base, velocity, [DWELL_PART])
+    with pytest.raises(UnusableData, match="largest sine is at 260 Hz, not near 130 Hz"):
+        analyse(path)
 
 
 def test_a_drive_at_a_frequency_that_was_not_planned_is_reported():
@@ -143,9 +181,9 @@ def test_a_drive_at_a_frequency_that_was_not_planned_is_reported():
 @pytest.mark.parametrize(
     ("share", "told"), [(1.0, Verdict.PASSED), (0.6, Verdict.WARNING), (1.1, Verdict.NOTE)]
 )
-def test_a_drive_level_below_its_plan_is_reported(dwell_file, share, told):
+def test_a_drive_level_below_its_plan_is_reported(weak, share, told):
     generator = load_rig("virtual_rig").generator.model_dump(mode="json")
-    facts = replace(analyse(dwell_file("weak")).facts, bench={"generator": generator})
+    facts = replace(weak.facts, bench={"generator": generator})
     setting_v = facts.measurement.excitation.amplitude_vpp / 2
     levels = tuple(
         replace(each, peak=share * setting_v) if each.header.role == "drive_voltage" else each
@@ -169,12 +207,47 @@ def scaled(facts, channel, factor, **header):
 
 
 @pytest.mark.parametrize(("role", "factor"), [("base_acceleration", 1e-6), ("m0_velocity", 1e-5)])
-def test_a_scale_that_makes_the_response_implausible_is_reported(dwell_file, role, factor):
-    facts = analyse(dwell_file("weak")).facts
+def test_a_scale_that_makes_the_response_implausible_is_reported(weak, role, factor):
+    facts = weak.facts
     assert "Scales" not in {each.what for each in measurement_checks(facts)}
     (found,) = [each for each in measurement_checks(scaled(facts, role, factor)) if each.what == "Scales"]
     assert found.verdict is Verdict.WARNING
     assert "check the scales or sensitivities of m0_velocity and base_acceleration" in found.text
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("factor", [1.0, 2.0, 0.1, -1.0])
+def test_noise_with_a_wrong_scale_or_sign_of_the_mass_is_reported(tmp_path, factor):
+    # Springs four times as stiff raise the lowest resonance far above the lowest line of the noise.
+    stiffer = replace(gong2025(), stiffnesses=tuple(4.0 * each for each in gong2025().stiffnesses))
+    plan, base, velocity, parts = synthetic.noise_from_rest(1e-8, settle_s=3.0, specimen=stiffer)
+    path = synthetic.write_recording(tmp_path, plan, base, factor * velocity, parts, name="noise")
+    found = [each.text for each in analyse(path).checks if each.what == "Scales"]
+    assert len(found) == (factor != 1.0)
+    assert all(f"moved {factor:.2g} times as far as the base" in text for text in found)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("case", ["related", "other noise", "1 s late", "0.02 s early"])
+def test_noise_of_a_mass_that_does_not_follow_the_base_is_reported(tmp_path, case):
+    base, velocity = synthetic.noise_band(10.0, 60.0, 560.0, 1e-8, seed=1)
+    _, other = synthetic.noise_band(10.0, 60.0, 560.0, 1e-8, seed=2)
+    size = np.std(velocity)
+    moved, text = {
+        "related": (velocity, None),
+        "other noise": (other, r"\(median 0\.\d+\) is not above that of unrelated signals"),
+        "1 s late": (np.roll(velocity, round(RATE)), r"about (0\.[89]\d?|1) s after the base"),
+        "0.02 s early": (np.roll(velocity, round(-0.02 * RATE)), r"about 0\.02 s before the base"),
+    }[case]
+    moved = moved + 0.01 * size * np.random.default_rng(3).standard_normal(moved.size)
+    plan = StreamedNoise(
+        amplitude_vpp=1.0, band_start_hz=60.0, band_stop_hz=560.0, duration_s=10.0, settle_s=0.0
+    )
+    parts = [synthetic.Part("noise", 0.0, 10.0, {})]
+    found = analyse(synthetic.write_recording(tmp_path, plan, base, moved, parts, name="noise"))
+    told = [each.text for each in found.checks if each.what == "Coherence"]
+    assert len(told) == (text is not None)
+    assert all(re.search(text, each) for each in told)
 
 
 def imported_base(unit, source):
@@ -185,8 +258,8 @@ def imported_base(unit, source):
 
 
 @pytest.mark.parametrize("case", ["small force", "sharp resonance", "base in V", "base from the drive"])
-def test_a_large_or_small_response_is_not_always_reported_as_a_wrong_scale(dwell_file, case):
-    facts = analyse(dwell_file("weak")).facts
+def test_a_large_or_small_response_is_not_always_reported_as_a_wrong_scale(weak, case):
+    facts = weak.facts
     match case:
         case "small force":
             found = scaled(facts, "m0_velocity", 1e-5, role="base_force", quantity="force")
@@ -204,14 +277,14 @@ def test_a_large_or_small_response_is_not_always_reported_as_a_wrong_scale(dwell
 
 
 @pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
-def test_no_minimum_level_is_checked_for_an_unknown_generator(dwell_file, generator):
-    facts = replace(analyse(dwell_file("weak")).facts, bench={"generator": generator})
+def test_no_minimum_level_is_checked_for_an_unknown_generator(weak, generator):
+    facts = replace(weak.facts, bench={"generator": generator})
     (found,) = [each for each in measurement_checks(facts) if "level" in each.what]
     assert found.verdict is Verdict.PASSED
 
 
-def test_a_calibration_dated_after_the_measurement_gives_a_warning_that_states_no_age(dwell_file):
-    facts = analyse(dwell_file("weak")).facts
+def test_a_calibration_dated_after_the_measurement_gives_a_warning_that_states_no_age(weak):
+    facts = weak.facts
     channels = tuple(
         replace(each, header=replace(each.header, calibration_date="2098-02-10")) for each in facts.channels
     )
@@ -222,10 +295,9 @@ def test_a_calibration_dated_after_the_measurement_gives_a_warning_that_states_n
     assert "days" not in found.text
 
 
-def test_the_level_of_a_channel_states_its_peak_and_its_rms(dwell_file, dwell_motions):
-    found = analyse(dwell_file("weak"))
+def test_the_level_of_a_channel_states_its_peak_and_its_rms(weak, dwell_motions):
     velocity = dwell_motions["weak"][1]
-    level = found.facts.level("m0_velocity")
+    level = weak.facts.level("m0_velocity")
     assert level.peak == pytest.approx(np.max(np.abs(velocity)), rel=1e-6)
     assert level.rms == pytest.approx(np.sqrt(np.mean(velocity**2)), rel=1e-6)
     assert level.share_of_range == pytest.approx(level.peak / 1.0)

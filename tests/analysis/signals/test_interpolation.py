@@ -22,7 +22,7 @@ def test_jointly_interpolated_channels_match_the_sampled_signals():
 
 
 @pytest.mark.parametrize("tiny", [0.0, 1e-18, -1e-18, 1e-12])
-def test_channels_interpolated_together_equal_those_interpolated_one_by_one(tiny):
+def test_interpolating_channels_together_or_one_by_one_gives_equal_results(tiny):
     samples = tones(np.arange(SAMPLES))
     positions = np.concatenate([np.arange(-80.0, SAMPLES + 80) + tiny, RNG.uniform(-80, SAMPLES + 80, 300)])
     together = interpolate(samples, positions)

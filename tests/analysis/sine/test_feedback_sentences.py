@@ -10,13 +10,13 @@ from tests.analysis.virtual_measurements import record, sampled_at
 from vibench.acquisition.plan import ResonanceTracking, SettledSine
 from vibench.acquisition.recording import Hold, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.analysis import CampaignResults, analyse, result_summary
-from vibench.analysis.figures.backbone import backbone_figure
 from vibench.analysis.figures.stepped_sine import (
     STEPPED_FREQUENCIES,
     TRACKED_RESONANCE,
+    backbone_figure,
     stepped_sine_figure,
 )
-from vibench.analysis.kinds.analysis_kind import Result
+from vibench.analysis.kinds import Result
 from vibench.analysis.report import findings, result_figures
 from vibench.analysis.sine.stepped_response import feedback_sentences, noted_jumps
 
@@ -46,8 +46,7 @@ STEP = SegmentNote(
 
 def test_only_jumps_with_a_bracket_are_counted():
     steep = JUMP.model_copy(update={"how": JumpSearchEnd.STEEP})
-    (jump,) = noted_jumps([JUMP, steep])
-    assert (jump.low_hz, jump.high_hz, jump.direction) == (100.9375, 101.25, "down")
+    assert noted_jumps([JUMP, steep]) == ((100.9375, 101.25, "down"),)
     assert list(feedback_sentences([JUMP])) == ["Jumps between 100.94 and 101.25 Hz (down)."]
 
 
@@ -56,7 +55,7 @@ def test_recorded_steps_are_counted_by_kind_of_motion():
     chaotic = STEP.model_copy(update={"motion": Steadiness.APERIODIC, "period": 0, "level": Hold.OUTSIDE})
     said = list(feedback_sentences([STEP, tripled, tripled, chaotic]))
     assert said == [
-        "Of 4 recorded motions, by kind: period 3: 2, no period: 1.",
+        "4 recorded motions, by kind: period 3: 2, no period: 1.",
         "The base level was out of tolerance in 1 of 4 recorded motions.",
     ]
 

@@ -7,7 +7,7 @@ from tests.analysis import synthetic_recordings as synthetic
 from tests.analysis.virtual_measurements import record, sampled_at, simulated_with
 from vibench.acquisition.plan import SteppedLevel
 from vibench.analysis import CampaignResults, analyse, result_summary
-from vibench.analysis.kinds.analysis_kind import Result
+from vibench.analysis.kinds import Result
 from vibench.analysis.report import findings, result_figures
 from vibench.analysis.sine.jumps import hysteresis_vpp, level_jumps
 from vibench.analysis.sine.stepped_response import SteppedResponse
@@ -62,7 +62,7 @@ def test_the_maximum_of_a_step_excludes_neighbouring_steps(analysis):
     np.testing.assert_allclose(found.response_i[rising], found.response_ii[rising], rtol=5e-3)
 
 
-def test_figure_and_summary_show_both_jumps(analysis):
+def test_the_figure_and_the_summary_show_both_jumps(analysis):
     (figure,) = result_figures(CampaignResults("levels", (Result(analysis, None),), ()))
     _, fall = level_jumps(analysis.response)
     assert "between 0.6 and 0.7 Vpp" in figure.caption
@@ -83,7 +83,7 @@ def test_the_report_summarises_levels_and_jumps(analysis):
 
 @pytest.mark.parametrize(
     ("share", "factor"),
-    [(0.2, 3.5), (0.2, 0.4), (0.4, 1 / 3.5), (0.6, 2.2), (0.75, 3.5), (0.75, 1 / 3.5)],
+    [(0.2, 3.5), (0.4, 1 / 3.5), (0.6, 2.2), (0.75, 1 / 3.5)],
 )
 def test_a_jump_during_the_record_of_one_step_counts_as_one_jump(tmp_path, factor, share):
     levels, settle_s, record_s = (0.2, 0.3, 0.4, 0.5), 0.5, 1.0

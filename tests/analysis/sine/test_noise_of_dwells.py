@@ -50,7 +50,7 @@ def test_bounds_of_response_i_hold_in_bench_noise(frequency_hz, tmp_path):
         first = budgets_of(found)[1]
         assert Cause.NOISE not in first.not_stated
         held.append(covers(first, linear(frequency_hz)))
-    # With 95 % coverage two misses in twelve have a probability of 12 %, three of 2 %.
+    # With 95 % coverage, two misses in twelve have a probability of 12 %, three of 2 %.
     assert np.count_nonzero(held) >= len(held) - 2, held
 
 

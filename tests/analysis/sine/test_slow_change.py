@@ -43,7 +43,7 @@ def stated_value(result, name):
     return (budget.value, budget.expanded) if is_told else None
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_slow_beat_is_not_called_periodic_and_its_bounds_cover_later_records(dwell, seed):
     """A beat of 30 % at 260.2 Hz was once periodic, with Response I 6.373591 +- 0.000023."""
     rng = np.random.default_rng(seed)
@@ -66,7 +66,7 @@ def test_a_slow_beat_is_not_called_periodic_and_its_bounds_cover_later_records(d
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("rate_hz", [0.1, 0.35, 1.1])
+@pytest.mark.parametrize("rate_hz", [0.1, 1.1])
 def test_a_slow_modulation_of_amplitude_or_phase_is_not_called_periodic(dwell, rate_hz):
     for number, envelope in enumerate(
         (
@@ -78,7 +78,7 @@ def test_a_slow_modulation_of_amplitude_or_phase_is_not_called_periodic(dwell, r
         assert kind in {MotionKind.QUASI_PERIODIC, MotionKind.UNDECIDED}
 
 
-def test_mains_hum_in_a_dwell_is_named_as_such(dwell):
+def test_mains_hum_in_a_dwell_is_reported_as_mains_hum(dwell):
     """260 Hz and 50 Hz hum once gave period 26, the common period of both."""
     verdict = dwell(lambda time_s: 1 + 0.02 * np.exp(2j * np.pi * (50 - HZ) * time_s)).analysis.motion.verdict
     assert (verdict.kind, verdict.period) == (MotionKind.PERIODIC, 1)
@@ -119,7 +119,7 @@ def unsettled_step(folder, hz, damping, seed):
     return result, abs(gain)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(4))
 def test_an_unsettled_step_is_reported_or_has_a_valid_bound(tmp_path, seed):
     """The stated values were once 44.38 +- 0.51 for 49.97 and 246.6 +- 0.58 for 249.8."""
     rng = np.random.default_rng(seed)

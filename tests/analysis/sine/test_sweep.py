@@ -15,10 +15,9 @@ from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.channels import Stretch
 from vibench.analysis.recordings.checks import Verdict
 from vibench.analysis.signals.interpolation import Decimator
-from vibench.analysis.sine.collision_region import collisions
 from vibench.analysis.sine.sweep import SweepSums, drive_phase
-from vibench.analysis.sine.sweep_analysis import measured_sweep, played_check
-from vibench.analysis.tones.order_tracking import track_orders
+from vibench.analysis.sine.sweep_analysis import collisions, measured_sweep, played_check
+from vibench.analysis.tones import track_orders
 
 RATE = 8192.0
 
@@ -128,7 +127,7 @@ def test_the_first_and_last_intervals_of_a_sweep_also_use_neighbouring_samples()
     found = sums.response()
     assert found.time_s.size == (time.size - 2 * reach) // round(found.interval_s * RATE)
     np.testing.assert_allclose(found.peak_displacement_m, 1.0, atol=0.01)
-    # Without the neighbouring samples the first and last intervals are wrong.
+    # Without the neighbouring samples, the first and last intervals are wrong.
     alone = sweep_response(*rows, RATE, low_hz=150, high_hz=350)
     assert np.max(np.abs(alone.peak_displacement_m[[0, -1]] - 1)) > 0.02
 
@@ -154,7 +153,7 @@ def test_decimation_removes_aliasing_components():
     assert np.max(np.abs(y[50:-50])) < 3e-5
 
 
-def test_recorded_sweep_phase_is_unaffected_by_a_clock_difference():
+def test_the_phase_of_a_recorded_sweep_is_unaffected_by_a_clock_difference():
     rate = 2048.0
     _, recorded = sweep(200, clock_ppm=10, rate_hz=rate)
     _, nominal = sweep(200, rate_hz=rate)
@@ -179,7 +178,7 @@ def test_all_orders_are_separated_even_if_intervals_are_not_whole_numbers_of_per
     assert np.max(tracked.residual_rms) < 1e-9
 
 
-def test_the_stated_uncertainty_of_an_order_is_its_scatter():
+def test_the_stated_uncertainty_of_an_order_equals_its_scatter():
     rng = np.random.default_rng(1)
     time, phase = sweep(60)
     x = np.cos(phase) + 0.3 * rng.standard_normal(time.size)
@@ -191,7 +190,7 @@ def test_the_stated_uncertainty_of_an_order_is_its_scatter():
 
 
 @pytest.mark.parametrize("direction", ["up", "down"])
-def test_responses_i_and_ii_of_a_swept_linear_motion_are_equal_and_its_envelope_is_exact(direction):
+def test_responses_i_and_ii_of_a_swept_linear_motion_are_equal_and_the_envelope_is_exact(direction):
     """The motion is x = 3 exp(-0.5 i) U at every frequency."""
     ends = (150.0, 350.0) if direction == "up" else (350.0, 150.0)
     time, phase = sweep(20, *ends)
@@ -289,3 +288,18 @@ def test_a_sweep_whose_end_was_not_played_is_reported(played_to_hz, verdict, is_
     assert found.verdict is verdict
     if verdict is Verdict.WARNING:
         assert re.search(r"at [\d.]+ Hz where [\d.]+ Hz were planned, 0\.[45]\d* s behind", found.text)
+
+
+def test_a_sweep_that_differs_from_its_planned_course_is_reported():
+    """A logarithmic sweep passed as linear; a sweep up and down was "8.8e+09 s ahead"."""
+    plan = SineSweep(amplitude_vpp=1.0, start_hz=150.0, stop_hz=250.0, duration_s=20.0)
+    time_s = np.arange(round(20 * RATE)) / RATE
+    logarithmic_hz = 150.0 * (250.0 / 150.0) ** (time_s / 20.0)
+    for played_hz, most_s in ((logarithmic_hz, 2.0), (250.0 - 10.0 * np.abs(time_s - 10.0), 20.0)):
+        wave = np.cos(2 * np.pi * np.cumsum(played_hz) / RATE)
+        response = sweep_response(wave, wave, wave, RATE, low_hz=150.0, high_hz=250.0)
+        found = played_check(response, plan)
+        assert found.verdict is Verdict.WARNING
+        assert 1.0 < float(re.search(r"planned, (\S+) s", found.text)[1]) <= most_s
+        planned = plan.model_copy(update={"spacing": "logarithmic"})
+        assert (played_check(response, planned).verdict is Verdict.PASSED) == (played_hz is logarithmic_hz)

@@ -56,7 +56,7 @@ def test_a_level_at_which_the_resonance_was_lost_is_excluded_from_the_backbone()
     assert tracked_resonances([lost_note(0, 1.0)]) == ()
 
 
-def test_a_level_without_resonance_reports_periods_phase_and_frequency():
+def test_a_level_without_a_resonance_reports_its_periods_its_phase_and_its_frequency():
     missed = note(1, 0.3, None, frequency_u_hz=None, lock="not met", periods=150)
     moved = missed.model_copy(update={"phase_deg": -86.4, "at_hz": 96.351, "motion": Steadiness.UNSETTLED})
     met = note(2, 0.4, 98.6, periods=120)
@@ -64,11 +64,11 @@ def test_a_level_without_resonance_reports_periods_phase_and_frequency():
     assert found == "Phase resonance at 98.600 ± 0.060 Hz (0.4 m/s², 120 periods)."
     assert not_found == (
         "No phase resonance at 0.3 m/s²: not met; after 150 periods the phase was -86.4° at 96.351 Hz, "
-        "the level within tolerance, the motion unsettled."
+        "the level was within tolerance, and the motion was unsettled."
     )
 
 
-def test_a_superharmonic_resonance_is_named_and_drawn_by_its_harmonic():
+def test_a_superharmonic_resonance_is_named_and_its_harmonic_is_drawn():
     met, unmet = note(0, 8.0, 31.7, harmonic=3, harmonic_m=8e-8), lost_note(1, 9.0)
     found, not_found = feedback_sentences([met, unmet.model_copy(update={"harmonic": 3})])
     assert found == "Superharmonic 3:1 phase resonance at 31.700 ± 0.060 Hz (8 m/s²)."
@@ -77,7 +77,7 @@ def test_a_superharmonic_resonance_is_named_and_drawn_by_its_harmonic():
     assert (drawn.amplitude_m, drawn.is_fundamental) == (8e-8, False)
 
 
-def test_a_subharmonic_resonance_is_named_and_drawn_by_its_amplitude():
+def test_a_subharmonic_resonance_is_named_and_its_amplitude_is_drawn():
     met = note(0, 30.0, 192.4, subharmonic=2, harmonic_m=2e-6)
     (found,) = feedback_sentences([met])
     assert found == "Subharmonic 1:2 phase resonance at 192.400 ± 0.060 Hz (30 m/s²)."
@@ -97,7 +97,7 @@ def test_a_subharmonic_resonance_is_named_and_drawn_by_its_amplitude():
         (100.05, "neither softening nor hardening is significant."),
     ],
 )
-def test_softening_or_hardening_is_stated_only_beyond_the_uncertainty(strong_hz, said):
+def test_softening_or_hardening_is_stated_only_if_it_exceeds_the_uncertainty(strong_hz, said):
     sentence = backbone_sentence(tracked_resonances([note(0, 0.5, 100.0), note(1, 2.0, strong_hz)]))
     assert sentence.startswith("From 0.5 to 2 m/s² the phase resonance moves by ")
     assert sentence.endswith(said)

@@ -7,8 +7,8 @@ from scipy import signal
 
 from vibench.analysis import InvalidRequest
 from vibench.analysis.signals.quantity import Quantity
-from vibench.analysis.spectra.spectra import amplitude_spectrum, spectral_density
-from vibench.analysis.tones.sine_fit import largest_peak
+from vibench.analysis.spectra import amplitude_spectrum, spectral_density
+from vibench.analysis.tones import largest_peak
 
 RATE = 2048.0
 

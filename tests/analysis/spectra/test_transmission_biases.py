@@ -17,7 +17,7 @@ def lagged_share(lag):
 
 
 @pytest.mark.parametrize("lag", [3, 40, 90])
-def test_a_delay_lowers_h1_by_the_share_of_the_segment_it_removes(lag):
+def test_a_delay_lowers_h1_by_the_share_of_the_segment_that_it_removes(lag):
     """E[h1] = rho(lag) exp(-i omega lag), with the autocorrelation rho of the window."""
     record = np.random.default_rng(41).standard_normal(600_000)
     found = transmissibility(record[lag:], record[:-lag], RATE, segment_samples=SEGMENT)

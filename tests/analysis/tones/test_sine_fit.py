@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.tones.sine_fit import fit_sine
+from vibench.analysis.tones import fit_sine
 
 RATE = 4096.0
 

@@ -15,8 +15,15 @@ from vibench.analysis.overlay.ensemble import EnsembleCurve
 from vibench.analysis.overlay.overlay import RESPONSE_I, RESPONSE_II
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine.dwell import dwell_response
-from vibench.analysis.uncertainty.budget import Budget, Cause, Contribution, stated_uncertainties
-from vibench.analysis.uncertainty.quantities import dwell_budgets, sd_of_largest, sweep_budgets
+from vibench.analysis.uncertainty.budget import (
+    Budget,
+    Cause,
+    Contribution,
+    dwell_budgets,
+    sd_of_largest,
+    stated_uncertainties,
+    sweep_budgets,
+)
 from vibench.sim import Harmonic, gong2025, integrate
 
 DRAWS = 150
@@ -84,7 +91,7 @@ def response_of(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
 
 
 @pytest.mark.thorough
-def test_an_uncertainty_budget_matches_propagation_of_distributions(samples, weak):
+def test_an_uncertainty_budget_matches_the_propagation_of_distributions(samples, weak):
     """Reference: JCGM 101:2008, with all inputs drawn from their distributions."""
     rng = np.random.default_rng(12)
 
@@ -138,7 +145,7 @@ def test_a_value_without_a_stated_uncertainty_has_no_coverage_factor():
     assert budget.sentence == "A0 32.68 µm (not stated: chance)"
 
 
-def test_an_uncertainty_document_states_source_and_date_of_each_calibration(weak):
+def test_an_uncertainty_document_states_the_source_and_the_date_of_each_calibration(weak):
     facts = replace(weak.analysis.facts, bench={**weak.analysis.facts.bench, **STATED})
     stated = stated_uncertainties(facts.bench, facts.response)
     assert stated.response[0].source == "vibrometer: certificate 17 (calibrated 2026-02-10)"
@@ -163,7 +170,7 @@ def test_the_response_i_budget_of_an_aperiodic_motion_includes_the_random_error(
     assert [each["quantity"] for each in said] == ["base amplitude A0", "Response I", "Response II"]
 
 
-def test_each_resonance_has_a_budget_and_that_of_the_damping_contains_no_calibration(noise_file):
+def test_each_resonance_has_a_budget_and_the_budget_of_its_damping_contains_no_calibration(noise_file):
     (noise,) = analyse_files([noise_file()], "noise", Simulation.LEFT_OUT).results
     budgets = budgets_of(noise)
     assert len(budgets) == 3 * len(noise.analysis.response.resonances) > 0

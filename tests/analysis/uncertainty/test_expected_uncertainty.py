@@ -57,7 +57,7 @@ def test_four_times_the_time_halves_the_scatter_but_not_calibration_errors():
 
 
 @pytest.mark.parametrize("role", ["m0_velocity", "base_acceleration"])
-def test_an_unmeasurable_motion_has_no_expected_uncertainty(role):
+def test_a_motion_that_cannot_be_measured_has_no_expected_uncertainty(role):
     daq = RIG.daq.model_copy(update={"channels": tuple(c for c in RIG.daq.channels if c.role != role)})
     rig = RIG.model_copy(update={"daq": daq})
     sine = Dwell(amplitude_vpp=0.2, frequency_hz=130.0, duration_s=2.0)
@@ -65,7 +65,7 @@ def test_an_unmeasurable_motion_has_no_expected_uncertainty(role):
         assert expected_uncertainty(Measurement(name="blind", excitation=excitation), rig) == ()
 
 
-def test_colliding_noise_has_no_expected_uncertainty():
+def test_noise_with_collisions_has_no_expected_uncertainty():
     plan = Measurement(name="strong", excitation=NOISE.model_copy(update={"amplitude_vpp": 3.0}))
     for each in expected_uncertainty(plan, RIG):
         assert each.after(10.0) is None
@@ -77,7 +77,7 @@ def dwell(at_hz, level_vpp):
     return Measurement(name="dwell", excitation=excitation)
 
 
-def test_random_error_is_expected_for_a_chaotic_dwell_and_noise_for_a_weak_dwell():
+def test_random_error_is_expected_for_a_chaotic_dwell_and_noise_is_expected_for_a_weak_dwell():
     first, second = expected_uncertainty(dwell(260, 1.5), RIG)
     assert first.cause is second.cause is Cause.CHANCE
     assert first.after(5.0) == first.after(500.0) > 0.01
@@ -106,7 +106,7 @@ def test_a_dwell_with_a_period_of_hours_has_no_expected_uncertainty():
     assert expected_uncertainty(Measurement(name="slow", excitation=slow), RIG) == ()
 
 
-def test_an_uncomputable_motion_has_no_expected_uncertainty(monkeypatch):
+def test_a_motion_that_cannot_be_computed_has_no_expected_uncertainty(monkeypatch):
     def raise_lost(*_, **__):
         raise MotionFailed("it is not finite")
 
@@ -153,7 +153,7 @@ def test_a_start_dependent_motion_has_no_expected_uncertainty():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", shipped_specimens())
-def test_expected_uncertainty_handles_every_shipped_specimen(name):
+def test_every_shipped_specimen_has_an_expected_uncertainty(name):
     """The shipped specimens include one-sided stops, rigid stops and none."""
     document = RIG.model_dump(mode="json")
     limit_m = document["specimen"]["amplitude_limit_m"]

@@ -70,9 +70,9 @@ def test_the_time_of_a_campaign_is_distributed_in_proportion_to_the_needed_times
 @pytest.mark.parametrize(
     ("until", "time_s", "said"),
     [
-        (None, 600.0, "no measurement with 'until' whose time can be predicted"),
+        (None, 600.0, "no measurement with 'until' has a predictable duration"),
         (Until(resonance_hz=0.00001), 100.0, "are too short for the targets of c, which need about"),
-        (Until(resonance_hz=0.00001), 1.0, "ramps, settling and measurements without targets take longer"),
+        (Until(resonance_hz=0.00001), 1.0, "ramps, settling and measurements without targets alone take"),
         (Until(resonance_hz=0.00001), 1e6, "give less time or wider bounds"),
     ],
 )

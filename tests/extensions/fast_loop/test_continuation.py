@@ -9,7 +9,7 @@ import pytest
 
 from tests.changed import changed
 from vibench.acquisition import ConfigurationError, LimitExceeded, open_bench, open_recording, run_measurement
-from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.excitation.plan import BaseLevel
 from vibench.acquisition.plan import Measurement, RunState
 from vibench.acquisition.recording import (
     BranchEnd,
@@ -26,9 +26,8 @@ from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
 from vibench_fast_loop.branch_continuation import BranchContinuation
-from vibench_fast_loop.branch_player import LoopLook
 from vibench_fast_loop.branch_solver import BranchSolver, LoopSetting, MeasuredPoint, is_new
-from vibench_fast_loop.continuation_controller import stability_note
+from vibench_fast_loop.continuation_controller import LoopLook, stability_note
 from vibench_fast_loop.fast_loop import fast_loop, impact_branch, require_held
 from vibench_fast_loop.open_loop_multiplier import (
     OpenLoopMultiplier,

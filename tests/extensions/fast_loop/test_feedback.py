@@ -21,12 +21,13 @@ from vibench_fast_loop.law import (
     RELATIVE_M,
     VOLT,
     LinearLaw,
+    LoopTiming,
+    SampledPlant,
     design_law,
     loop_multiplier,
     loop_transfer,
     pd_law,
 )
-from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 RATE_HZ = 10_240.0
 K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
@@ -67,7 +68,7 @@ def test_the_sampled_plant_model_matches_the_compiled_simulation(latency_s):
 
 
 @pytest.mark.thorough
-def test_multipliers_on_a_very_heavy_table_match_those_of_the_branch():
+def test_multipliers_on_a_very_heavy_table_match_the_multipliers_of_the_branch():
     found = branch()
     points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
     # The free table adds a multiplier of one.

@@ -15,7 +15,7 @@ from vibench.acquisition import (
     open_bench,
     run_measurement,
 )
-from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.excitation.plan import BaseLevel
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.rig import confirm_simulated, load_rig
 from vibench_fast_loop.branch_continuation import BranchContinuation
@@ -127,7 +127,7 @@ def test_the_controller_board_passes_the_contract_tests(board_and_rig, promise):
 
 
 @pytest.mark.thorough
-def test_an_incompatible_ungated_or_occupied_board_is_refused(board_and_rig):
+def test_a_board_that_is_incompatible_or_ungated_or_occupied_is_refused(board_and_rig):
     board, rig = board_and_rig
     board.version = 4
     with pytest.raises(
@@ -163,17 +163,17 @@ def test_a_lost_connection_to_the_board_is_reported_and_closes_its_safety_gate(p
 
 
 @pytest.mark.thorough
-def test_a_sample_stream_that_ends_is_reported_and_the_board_silenced(playing_board):
+def test_a_sample_stream_that_ends_is_reported_and_the_board_is_silenced(playing_board):
     board, bench = playing_board
     board.is_mute = True
     bench.digitizer.read(6400)
-    with pytest.raises(InstrumentError, match=r"its samples no longer arrive\. It was silenced"):
+    with pytest.raises(InstrumentError, match=r"its samples no longer arrive\. The board was silenced"):
         bench.controller.report()
     assert not board.is_armed
 
 
 @pytest.mark.thorough
-def test_a_command_refused_by_the_board_silences_it_with_its_message(playing_board):
+def test_a_board_that_refuses_a_command_is_silenced_and_its_message_is_reported(playing_board):
     board, bench = playing_board
     board.refuses = {"forcing_coeffs": BUSY}
     bench.controller.play(SERIES.model_copy(update={"reference_v": ((0.2, 0.0),)}))
@@ -184,7 +184,7 @@ def test_a_command_refused_by_the_board_silences_it_with_its_message(playing_boa
     assert "busy" in told.reason
     assert not board.is_armed
     board.refuses = {"ctrl_kp": BUSY}
-    with pytest.raises(InstrumentError, match=r"refused .* as ctrl_kp: busy\. It was silenced"):
+    with pytest.raises(InstrumentError, match=r"refused .* as ctrl_kp: busy\. The board was silenced"):
         bench.controller.play(SERIES.model_copy(update={"feedback": pd(1.0, 0.0, 0.0, 1 / 4000)}))
     assert not board.is_armed
 

@@ -8,7 +8,7 @@ import pytest
 
 from vibench.acquisition.rig import ControllerConfig, load_rig
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.world.wiring import Coupling, Input
+from vibench.virtual_rig.world.conversion import Coupling, Input
 
 HOST = """
 import sys

@@ -26,7 +26,7 @@ class Link:
     [b"\n", b"\x1b[2J\n", b"[" * 3_000_000, b"1" * 3_000_000, b'{"name": NaN}\n', b"\xff\n", b'"refused"\n'],
     ids=["empty", "escapes", "nested", "digits", "nan", "bytes", "text"],
 )
-def test_an_invalid_report_line_raises_one_error(line):
+def test_an_invalid_report_line_raises_a_single_error(line):
     config = ControllerConfig(rate_hz=10_240, latency_s=3e-4, limit_v=2, source="test")
     with pytest.raises(InstrumentError, match="does not speak loop protocol"):
         LineController(Link(line), config)

@@ -87,7 +87,7 @@ def covers(each, size):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("index", [60, 300])
-def test_the_stability_of_a_held_motion_follows_from_base_and_m0(index):
+def test_the_stability_of_a_held_motion_follows_from_the_motion_of_the_base_and_m0(index):
     fitted, size = fitted_multipliers(index, 6, 1.0, 1)
     assert sum(covers(each, size) for each in fitted) >= 5
     for each in fitted:
@@ -111,7 +111,7 @@ def test_multiplier_bounds_are_two_sided():
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
-def test_multiplier_bounds_have_their_coverage_and_verdicts_are_right():
+def test_multiplier_bounds_have_their_stated_coverage_and_verdicts_are_right():
     """240 simulations of 10 motions with low and high noise: at least 92 % in the 95 % bounds."""
     inside, wrong, draws = 0, 0, 0
     for noise in (1.0, 4.0):

@@ -9,7 +9,7 @@ import pytest
 
 import vibench_fast_loop
 from tests.analysis.conftest import synthetic
-from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.excitation.plan import BaseLevel
 from vibench_fast_loop.branch_continuation import BranchContinuation
 
 ROOT = Path(__file__).resolve().parents[3]

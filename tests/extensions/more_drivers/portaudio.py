@@ -15,7 +15,7 @@ import numpy as np
 
 from tests.changed import changed
 from vibench.acquisition.rig import OutputConfig
-from vibench.virtual_rig.world.wiring import Coupling, Input
+from vibench.virtual_rig.world.conversion import Coupling, Input
 
 FRAMES = 512
 CARD = "Simulated card"

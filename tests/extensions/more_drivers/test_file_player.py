@@ -74,7 +74,7 @@ def test_the_end_of_the_played_recording_is_reported(playing, original):
 @pytest.mark.parametrize(
     ("daq", "said"),
     [
-        ({"options": {}}, "names none"),
+        ({"options": {}}, "names no recording"),
         ({"sample_rate_hz": 25600.0}, "samples a second; the configuration"),
     ],
 )
@@ -84,7 +84,7 @@ def test_playback_on_a_bench_that_does_not_match_the_recording_is_refused(playin
 
 
 def test_playback_needs_no_valid_calibration(playing):
-    with pytest.raises(ConfigurationError, match="names none"):
+    with pytest.raises(ConfigurationError, match="names no recording"):
         open_bench(calibrated_on(playing(options={}), "2001-01-01"))
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from tests.acquisition.run.test_command_time import cycles
 from vibench.acquisition import open_bench, open_recording, run_campaign, run_measurement
-from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.bench import Verdict
 from vibench.acquisition.campaign import PointOutcome
 from vibench.acquisition.check.admission import check_bench
 from vibench.acquisition.errors import ConfigurationError, LimitExceeded
@@ -68,7 +68,7 @@ def test_a_hardware_sweep_matches_its_plan(tmp_path, ends, spacing):
     assert (found.response.frequency_hz[0], found.response.frequency_hz[-1]) == pytest.approx(ends, rel=0.1)
 
 
-def test_a_generator_without_hardware_sweep_is_refused_before_output():
+def test_a_generator_without_a_hardware_sweep_is_refused_before_output():
     with pytest.raises(LimitExceeded, match=r"AFG1022.*set swept_by = \"computer\""):
         require_within_limits(sweep(), load_rig("virtual_rig"))
 
@@ -101,7 +101,7 @@ def test_the_preview_of_a_hardware_sweep_shows_the_whole_sweep():
 @pytest.mark.parametrize(
     ("bench", "swept_by"), [("virtual_rig", "computer"), ("virtual_rig_keysight", "generator")]
 )
-def test_check_and_campaign_run_in_real_time_with_instrument_delays(tmp_path, bench, swept_by):
+def test_a_check_and_a_campaign_run_in_real_time_with_instrument_delays(tmp_path, bench, swept_by):
     excitations = {
         "noise": WhiteNoise(amplitude_vpp=0.2, band_start_hz=50, band_stop_hz=800, realisations=2, periods=3),
         "dwell": Dwell(amplitude_vpp=0.2, frequency_hz=260, settle_s=0.5, duration_s=2.0),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
-from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.bench import Verdict
 from vibench.acquisition.check.bench_report import bench_report
 from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, StreamedNoise, WhiteNoise
@@ -98,7 +98,7 @@ def test_noise_that_needs_a_generator_is_refused_before_output(card_bench, tmp_p
 @pytest.mark.parametrize("missing", ["calibrated", "input_full_scale_v", "output_full_scale_v", "low_cut_hz"])
 def test_a_sound_card_without_a_calibration_is_not_opened(card_rig, audio, missing):
     rig = card_rig(**{missing: None}).model_copy(update={"virtual": None})
-    with pytest.raises(ConfigurationError, match=rf"daq\.options lacks {missing}"):
+    with pytest.raises(ConfigurationError, match=rf"daq\.options has no {missing}"):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
@@ -162,7 +162,7 @@ def test_a_missing_output_of_a_card_is_reported(card_rig, audio):
         open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
 
 
-def test_unread_samples_of_a_sound_card_are_kept_for_the_buffer_time_only(card_rig, audio):
+def test_unread_samples_of_a_sound_card_are_kept_only_for_the_buffer_time(card_rig, audio):
     rig = card_rig()
     card = _Card(rig, (0, 1, 2, 3), 0)
     heard, fine = np.zeros((4800, 4), dtype=np.float32), SimpleNamespace(input_overflow=False)

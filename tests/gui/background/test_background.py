@@ -10,7 +10,7 @@ from time import sleep
 
 import pytest
 
-from vibench.gui.background.background import Background, LatestRequest
+from vibench.gui.background import Background, LatestRequest
 
 
 def test_background_errors_keep_their_type_and_dropped_results_are_discarded(context, qtbot):

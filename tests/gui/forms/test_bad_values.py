@@ -11,7 +11,7 @@ from vibench.analysis.prediction.progress import MapRequest, SimulationRequest
 from vibench.gui.forms.editor import Choice
 from vibench.gui.forms.model_form import GroupEditor, ValidatedForm
 from vibench.gui.pages.queue.queue_page import SweepForm
-from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN, SPECTRUM
+from vibench.gui.pages.simulate.simulate_page import BRANCHES, CHAIN, SPECTRUM
 from vibench.gui.pages.test.test_page import TestForm as FormOfATest
 from vibench.gui.window.menus import Preferences
 
@@ -63,7 +63,7 @@ def type_into(widget, text):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", FORMS)
-def test_the_error_for_a_bad_value_names_its_field_and_unit(closing, name):
+def test_the_error_for_a_bad_value_names_the_field_and_the_unit(closing, name):
     form = closing(FORMS[name]())
     assert form.value is not None, form.complaint  # a newly chosen kind begins with valid values
     asked = 0
@@ -84,7 +84,7 @@ def test_the_error_for_a_bad_value_names_its_field_and_unit(closing, name):
     assert asked >= len(BAD)
 
 
-def test_a_sweep_is_refused_with_the_name_and_the_unit_of_its_field(closing):
+def test_a_bad_value_in_a_sweep_is_refused_with_the_name_and_the_unit_of_its_field(closing):
     form = closing(SweepForm())
     refused, wanted = [], []
     form.refused.connect(refused.append)

@@ -5,7 +5,7 @@ import pytest
 from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpectrumRequest
 from vibench.analysis.prediction.progress import MapRequest, SimulationRequest
 from vibench.gui.forms.model_form import ValidatedForm
-from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN
+from vibench.gui.pages.simulate.simulate_page import BRANCHES, CHAIN
 
 HIDDEN = BRANCHES.hidden | CHAIN.hidden
 GIVEN = {"start": 60.0, "stop": 62.0}

@@ -81,13 +81,13 @@ def field(closing):
         ("m", None, 7e-6),
     ],
 )
-def test_a_number_without_unit_is_in_the_displayed_unit(qtbot, field, unit, value, taken):
+def test_a_number_without_a_unit_is_in_the_displayed_unit(qtbot, field, unit, value, taken):
     edit = field(unit, value)
     assert type_text(qtbot, edit, "7") == taken
     assert edit.complaint == ""
 
 
-def test_numbers_without_unit_in_a_list_are_in_the_displayed_unit(qtbot):
+def test_numbers_without_a_unit_in_a_list_are_in_the_displayed_unit(qtbot):
     editor = ListEditor("m", lambda: None)
     qtbot.addWidget(editor.widget)
     editor.show_content([5e-6, 2e-3])

@@ -21,12 +21,12 @@ from vibench.acquisition.recording import (
 from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.live import LiveChannel, LiveView
 from vibench.analysis.prediction.progress import SimulatedPoint, SimulatedSignal, SimulationProgress
-from vibench.gui.engine_link.bridge import warm_up
+from vibench.gui.engine_link import warm_up
 from vibench.gui.pages.queue.draft import with_sweep
 from vibench.gui.widgets.notice import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
 from vibench.gui.widgets.theme import DARK, LIGHT
-from vibench.gui.window.open_window import load_ahead
 from vibench.gui.window.screenshots import SHOWN, SHOWN_TOO
+from vibench.gui.window.window import load_ahead
 
 RATE_HZ, LONG_S, STEPS = 51_200.0, 20.0, 200
 LONG_CHANNELS = (
@@ -230,7 +230,7 @@ def actions(window, recording, long_recording, folder):
 @pytest.mark.thorough
 @pytest.mark.timeout(300)  # one minute on an idle machine, two with cold kernels on a busy one
 @pytest.mark.usefixtures("_without_leftovers")
-def test_no_action_on_a_page_blocks_the_event_loop_longer_than_its_bound(
+def test_no_action_on_a_page_blocks_the_event_loop_longer_than_allowed(
     window, record, long_recording, tmp_path, qtbot, longest_blocking
 ):
     window.context.folder.mkdir()

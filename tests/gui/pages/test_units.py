@@ -44,9 +44,10 @@ def _usual_again():
     UNITS.choose({})
 
 
-@pytest.fixture
-def full_window(window, record, tmp_path, qtbot):
+@pytest.fixture(scope="module")
+def full_window(lasting_window, record, tmp_path_factory, wait_for):
     """A window with displacements, velocities and accelerations on every page."""
+    window = lasting_window
     pages, context = window.pages, window.context
     rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
     context.selection.choose_rig(rig)
@@ -70,7 +71,7 @@ def full_window(window, record, tmp_path, qtbot):
         forecast_m=(), forecast_error_m=(), numbers=(("lower gap", "(44.001 ± 0.005) µm"),),
     )  # fmt: skip
     pages[RUN].hidden_motion.show_status(status.model_copy(update={"twin": twin}))
-    path = record(tmp_path, "a")
+    path = record(tmp_path_factory.mktemp("recording"), "a")
     context.recording_requested.emit(path)
     frequency_hz = np.linspace(200.0, 300.0, 50)
     for name in ("model hertz, 5 µm", "model linear, 10 to 20 µm"):
@@ -86,12 +87,12 @@ def full_window(window, record, tmp_path, qtbot):
         SettledMotion(260.0, 5e-6, said, shown, shown, shown, (4.5e-5, 4.5e-5), shown * 1e7, shown)
     )
     pages[QUEUE].open_file(shipped("campaigns/paper.toml"))
-    qtbot.waitUntil(lambda: bool(pages[FILES].time_histories.plots), timeout=60_000)
+    wait_for(lambda: bool(pages[FILES].time_histories.plots))
     return window
 
 
-def choose_units(window, units):
-    dialog = SettingsDialog(window.context, window)
+def choose_units(context, window, units):
+    dialog = SettingsDialog(context, window)
     dialog.form.form.show_content({**dialog.form.form.content(), **units})
     dialog.accept()
     dialog.deleteLater()
@@ -138,7 +139,7 @@ def test_a_change_of_units_converts_every_number_and_can_be_undone(full_window):
     values = {name: numbers_of(page) for name, page in full_window.pages.items()}
     converted = {name for name, texts in before.items() if any(map(OLD.search, texts))}
     assert converted >= {TEST, RUN, FILES, COMPARE, SIMULATE, MAPS}
-    choose_units(full_window, OTHERS)
+    choose_units(full_window.context, full_window, OTHERS)
     for name, page in full_window.pages.items():
         left = [text for text in texts_of(page) if OLD.search(text)]
         assert left == [], name
@@ -151,7 +152,7 @@ def test_a_change_of_units_converts_every_number_and_can_be_undone(full_window):
         "(g)",
     ):
         assert text in now, text
-    choose_units(full_window, USUAL)
+    choose_units(full_window.context, full_window, USUAL)
     assert {name: list(texts_of(page)) for name, page in full_window.pages.items()} == before
 
 
@@ -182,8 +183,8 @@ def test_lists_of_numbers_are_read_in_the_displayed_unit(closing):
 
 
 @pytest.mark.thorough
-def test_the_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
-    choose_units(full_window, OTHERS)
+def test_the_chosen_units_are_kept_after_a_restart(context, closing, tmp_path):
+    choose_units(context, closing(QWidget()), OTHERS)
     UNITS.choose({})
     again = AppContext(Settings(tmp_path / "window.ini"))
     assert tuple(UNITS.chosen_units.values()) == tuple(OTHERS.values())
@@ -194,7 +195,7 @@ def test_the_chosen_units_are_kept_after_a_restart(full_window, tmp_path):
 def test_axis_numbers_are_in_the_unit_of_the_label(full_window):
     plot = next(each for each in full_window.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
     usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)
-    choose_units(full_window, OTHERS)
+    choose_units(full_window.context, full_window, OTHERS)
     assert plot.up.labelText == "g"
     assert plot.up.tickStrings([0.0, STANDARD], 1.0, STANDARD) == ["0", "1"] != usual
 
@@ -218,7 +219,7 @@ def test_a_field_accepts_its_displayed_text_and_any_stated_unit(unit, shown, tex
     assert parse_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
 
 
-def test_a_value_keeps_its_digits_when_shown_in_a_coarser_unit(closing):
+def test_a_value_keeps_its_digits_when_it_is_shown_in_a_coarser_unit(closing):
     form = closing(ValidatedForm(HeldDwell, "dwell"))
     form.form.show_content({"base_level": {"acceleration_m_per_s2": 1.2345678901234}})
     edit = form.form.editors["base_level"].form.editors["acceleration_m_per_s2"].widget
@@ -240,7 +241,7 @@ def test_a_value_keeps_its_digits_when_shown_in_a_coarser_unit(closing):
         ("0.25 m/s, -12 mm/s", "0.25 m/s, -0.012 m/s"),
     ],
 )
-def test_quantities_in_sentences_are_converted_to_the_chosen_units_only(sentence, converted):
+def test_quantities_in_sentences_are_converted_only_to_the_chosen_units(sentence, converted):
     UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
     assert UNITS.convert(sentence) == converted
 

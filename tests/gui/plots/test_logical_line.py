@@ -7,7 +7,7 @@ import sys
 import pytest
 
 WIDTHS = """
-from vibench.gui.window.open_window import application
+from vibench.gui.window.window import application
 application([])
 from vibench.gui.plots.axis import TIME, PlotAxis
 from vibench.gui.plots.line_style import LineStyle

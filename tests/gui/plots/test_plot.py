@@ -73,7 +73,7 @@ def test_the_legend_wraps_above_the_axes(plot, qapp):
     assert bottom < lower <= lower_top
 
 
-def test_a_label_is_shortened_when_space_is_small(plot, qapp):
+def test_a_label_is_shortened_when_there_is_little_space(plot, qapp):
     plot.show()
     qapp.processEvents()
     assert plot.up.labelText == "Velocity of the mass (mm/s)"

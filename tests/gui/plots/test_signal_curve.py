@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from vibench.gui.pages.test.test_page import SignalCurve
 from vibench.gui.plots.axis import TIME, PlotAxis
 from vibench.gui.plots.line_style import curve_style
 from vibench.gui.plots.plot import Plot
-from vibench.gui.plots.signal_curve import SignalCurve
 from vibench.gui.widgets.theme import LIGHT
 
 RATE_HZ = 51200.0

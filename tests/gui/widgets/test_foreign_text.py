@@ -7,7 +7,7 @@ from PySide6.QtGui import Qt as Text, QTextDocument
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.gui.pages.compare.curve_plots import CurveList, PairBox
-from vibench.gui.pages.rig.rig_page import RigChoice
+from vibench.gui.pages.rig import RigChoice
 from vibench.gui.plots.axis import TIME, PlotAxis
 from vibench.gui.plots.line_style import LIMIT, curve_style
 from vibench.gui.plots.plot import Plot

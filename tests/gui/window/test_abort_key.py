@@ -28,7 +28,7 @@ def test_the_abort_key_works_in_a_field(qtbot, abort_signals, key):
     assert abort_signals == ["abort"]
 
 
-def test_the_abort_key_works_in_a_modal_dialog_and_closes_it(qtbot, closing, abort_signals):
+def test_the_abort_key_works_in_a_modal_dialog_and_closes_the_dialog(qtbot, closing, abort_signals):
     window = closing(QWidget())
     window.show()
     dialog = QDialog(window)

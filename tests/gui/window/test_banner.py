@@ -18,7 +18,7 @@ def test_the_banner_shows_the_state_by_a_symbol_a_word_and_a_colour(closing):
     assert label.property("tone") == "active"
 
 
-def test_a_click_on_stop_requests_a_stop(qtbot, closing):
+def test_a_click_on_the_stop_button_requests_a_stop(qtbot, closing):
     banner = closing(Banner())
     with qtbot.waitSignal(banner.stop_requested):
         banner.findChild(QPushButton, "stop").click()

@@ -28,7 +28,7 @@ def own(tmp_path):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("page", [TEST, QUEUE])
-def test_saving_a_test_or_campaign_on_a_full_disk_gives_one_message(lasting_window, own, monkeypatch, page):
+def test_saving_a_test_or_a_campaign_on_a_full_disk_gives_one_message(lasting_window, own, monkeypatch, page):
     measurement = lasting_window.context.selection.measurement
     lasting_window.context.selection.choose_campaign(Campaign(name="night", measurements=(measurement,)))
     (own / "mine.toml").write_text("older")
@@ -38,7 +38,7 @@ def test_saving_a_test_or_campaign_on_a_full_disk_gives_one_message(lasting_wind
         lasting_window.pages[page]._save()
     (notice,) = lasting_window.strip.notices[known:]
     assert "mine.toml: cannot be written" in notice.what
-    assert "save it elsewhere" in notice.what
+    assert "save the file elsewhere" in notice.what
     assert content(own) == before
 
 

@@ -58,27 +58,26 @@ def test_a_dropped_file_opens_on_its_page_and_is_listed_as_recent(window, tmp_pa
     ("name", "content"),
     [("a.txt", b"x"), ("a.toml", b"\xff"), ("b.toml", b"a = 1"), ("c.toml", b"["), ("gone.toml", None)],
 )
-def test_unsupported_files_are_reported_and_change_nothing(window, tmp_path, name, content):
+def test_unsupported_files_are_reported_and_change_nothing(lasting_window, tmp_path, name, content):
     if content is not None:
         (tmp_path / name).write_bytes(content)
-    before = window.page
-    drop(window, tmp_path / name)
-    assert window.page is before
-    assert name in window.strip.notices[-1].what
-    assert window.context.recent_files == ()
+    before = lasting_window.page
+    drop(lasting_window, tmp_path / name)
+    assert lasting_window.page is before
+    assert name in lasting_window.strip.notices[-1].what
+    assert lasting_window.context.recent_files == ()
 
 
 @pytest.mark.thorough
-def test_a_file_that_is_not_a_recording_is_reported_on_the_files_page(window, qtbot, tmp_path):
+def test_a_file_that_is_not_a_recording_is_reported_on_the_files_page(lasting_window, qtbot, tmp_path):
     (tmp_path / "broken.h5").write_bytes(b"no file of that kind")
-    drop(window, tmp_path / "broken.h5")
-    assert window.page is window.pages[COMPARE]
-    qtbot.waitUntil(lambda: bool(window.strip.notices), timeout=100_000)
-    assert "broken.h5" in window.strip.notices[-1].what
+    drop(lasting_window, tmp_path / "broken.h5")
+    assert lasting_window.page is lasting_window.pages[COMPARE]
+    qtbot.waitUntil(lambda: "broken.h5" in lasting_window.strip.notices[-1].what, timeout=100_000)
 
 
 @pytest.mark.thorough
-def test_edits_of_test_and_campaign_can_be_undone(window, qtbot):
+def test_edits_of_a_test_and_of_a_campaign_can_be_undone(window, qtbot):
     selection, key = window.context.selection, Qt.KeyboardModifier.ControlModifier
     window.show_page(TEST)
     first = selection.measurement
@@ -127,7 +126,7 @@ def test_all_settings_are_edited_in_one_form_and_stored(window, qapp, tmp_path):
 
 
 @pytest.mark.thorough
-def test_help_works_offline_and_lists_installed_versions(window, qtbot):
+def test_the_help_works_offline_and_lists_installed_versions(window, qtbot):
     qtbot.keyClick(window, Qt.Key.Key_F1)
     keys = next(each for each in window.findChildren(QLabel) if "<table>" in each.text())
     assert all(word in keys.text() for word in ("F5", "F6", "Ctrl+7", "Ctrl+Z", "Shift+F1", "Esc, Pause"))

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.page.page import PageParts
 from vibench.gui.plots.plot import Plot
-from vibench.gui.widgets.notice import FILES, RIG, TEST
+from vibench.gui.widgets.notice import FILES, TEST
 from vibench.gui.widgets.theme import DARK, LIGHT
 from vibench.gui.window.window import PAGES, Window
 
@@ -52,7 +52,7 @@ def test_a_restart_restores_the_theme_the_page_and_the_test_without_arming(windo
     again.deleteLater()
 
 
-def test_banner_and_stop_are_visible_on_every_page(lasting_window, qapp):
+def test_the_banner_and_the_stop_button_are_visible_on_every_page(lasting_window, qapp):
     for name in lasting_window.pages:
         lasting_window.show_page(name)
         qapp.processEvents()
@@ -71,8 +71,9 @@ def test_every_plot_follows_the_theme(lasting_window, qtbot, theme):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("order", ["arm_test", "start", "check"])
-def test_a_command_that_needs_a_bench_shows_the_next_step(window, order):
-    getattr(window.user_actions, order)()
-    newest = window.strip.notices[-1]
+def test_a_command_that_needs_a_bench_shows_the_next_step(lasting_window, order):
+    page, notices = lasting_window.page, lasting_window.strip.notices
+    getattr(lasting_window.user_actions, order)()
+    (newest,) = lasting_window.strip.notices[len(notices) :]
     assert newest.next_step
-    assert window.page is window.pages[RIG]
+    assert lasting_window.page is page

@@ -24,7 +24,7 @@ def benchmark(*state_errors, regime=Regime.PERIODIC):
         ((1.3e-8, 1.0e-8, 0.9e-8), "All levels are about equally accurate", ["standard", "reference"]),
     ],
 )
-def test_an_accuracy_level_without_improvement_is_reported_as_such(state_errors, said, without):
+def test_an_accuracy_level_without_improvement_is_reported_as_useless(state_errors, said, without):
     found = benchmark(*state_errors)
     assert found.advice.startswith(said)
     assert found.advice.endswith("`reference` takes 2.0 times as long as `quick`.")

@@ -29,7 +29,7 @@ def test_every_accuracy_level_meets_its_stated_accuracy(motion):
         assert state_error(found, truth) <= level.promise
 
 
-def test_higher_accuracy_levels_improve_periodic_motions_but_not_chaotic_ones():
+def test_higher_accuracy_levels_improve_periodic_motions_but_not_chaotic_motions():
     periodic = measure_motion(MOTIONS[1], SHORT)
     quick, _, reference = periodic.levels
     assert reference.state_error < 5e-2 * quick.state_error

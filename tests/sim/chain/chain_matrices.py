@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from vibench.sim.specimen.modes import diagonal_form
-
 MASSES_PER_CELL = 3
 
 
@@ -31,11 +29,3 @@ def chain_impulses(chain):
         _, m1, m2 = cell.masses
         entry[first + 1, place], entry[first + 2, place] = 1.0 / m1, -1.0 / m2
     return entry
-
-
-def chain_modal_form(chain):
-    """Return the diagonal form of the state matrix, for any damping.
-
-    Raises ValueError if two modes coincide (critical damping).
-    """
-    return diagonal_form(np.diag(chain.masses), chain.stiffness_matrix, chain.damping_matrix)

@@ -9,8 +9,6 @@ from hypothesis import given, settings, strategies as st
 from tests.sim.as_written import distance
 from vibench.sim import (
     Accuracy,
-    HuntCrossley,
-    LinearGap,
     LinearSweep,
     LogarithmicSweep,
     Outcome,
@@ -89,19 +87,6 @@ def test_base_motion_stores_energy_only_in_the_first_cell():
     moved = chain_energies(chain, np.zeros((4, 2, 6)), np.full(4, 1e-5))
     np.testing.assert_allclose(moved[:, 0], 0.5 * chain.cells[0].stiffnesses[0] * 1e-10)
     np.testing.assert_array_equal(moved[:, 1], 0.0)
-
-
-def test_stops_store_energy_only_in_contact():
-    cell = gong2025(gap_m=(30e-6, 60e-6))
-    for contact in (cell.contact, HuntCrossley(cell.contact.stiffness, 0.3), LinearGap(2e5)):
-        chain = chain_of(replace(cell, contact=contact), 1)
-        p = np.array([-40e-6, -25e-6, 50e-6, 61e-6])
-        states = np.zeros((4, 1, 6))
-        states[:, 0, 1] = p
-        stops = chain_energies(chain, states)[:, 0] - 0.5 * cell.stiffnesses[1] * p**2
-        depth = np.array([10e-6, 0.0, 0.0, 1e-6])
-        exponent, stiffness = contact.stops.term[::-1]
-        np.testing.assert_allclose(stops, stiffness * depth ** (exponent + 1) / (exponent + 1), atol=1e-15)
 
 
 UNEQUAL = Chain((gong2025(damping_time_s=0.0), gong2025(damping_time_s=0.0)))

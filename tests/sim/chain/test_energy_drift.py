@@ -1,9 +1,9 @@
-"""Energy conservation of undamped chains, and a chain of one cell."""
+"""Energy conservation of undamped chains."""
 
 import numpy as np
 import pytest
 
-from vibench.sim import Harmonic, LinearSweep, Outcome, Sampled, gong2025, integrate
+from vibench.sim import Harmonic, Outcome, Sampled, gong2025, integrate
 from vibench.sim.chain import chain_energies, chain_of, integrate_chain
 
 pytestmark = pytest.mark.timeout(300)
@@ -30,13 +30,6 @@ def test_undamped_chains_with_hertz_contacts_have_small_energy_errors_without_bi
     assert found.min() < 0.0 < found.max()
 
 
-@pytest.mark.parametrize(
-    ("contact", "bound"), [("power:5", 3e-5), ("power:3", 3e-5), ("linear_gap:2e5", 1e-6)]
-)
-def test_undamped_chains_with_other_contact_laws_keep_their_energy(contact, bound):
-    assert np.abs(drifts(contact, 3, 0.5)).max() < bound
-
-
 @pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
 @pytest.mark.parametrize("cells", [1, 2])
 @pytest.mark.parametrize(
@@ -52,7 +45,7 @@ def test_undamped_chains_with_other_contact_laws_keep_their_energy(contact, boun
         "power:3+5+7",
     ],
 )
-def test_energy_is_conserved_for_every_law_drive_and_accuracy_level(contact, cells, accuracy):
+def test_energy_is_conserved_for_every_contact_law_and_drive_and_accuracy_level(contact, cells, accuracy):
     """Energy errors were once 2e-2 with a sampled drive and 2e-3 with a power law."""
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     chain = chain_of(specimen, cells)
@@ -68,13 +61,12 @@ def test_energy_is_conserved_for_every_law_drive_and_accuracy_level(contact, cel
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("accuracy", ["quick", "standard", "reference"])
-def test_a_motion_deep_inside_a_steep_contact_is_integrated_at_every_accuracy_level(accuracy):
-    """At reference accuracy the step control once asked for less than rounding, and the run stalled."""
+def test_a_motion_deep_inside_a_steep_contact_is_integrated_at_reference_accuracy():
+    """At reference accuracy, the step control once asked for less than rounding, and the run stalled."""
     specimen = gong2025(damping_time_s=0.0, contact="power:47")
     chain = chain_of(specimen, 1)
     start = np.array([0.0, 1.5 * specimen.gap_m, 0.0, 0.0, 0.0, 0.0])
-    run = integrate(specimen, STILL, 0.02, accuracy, start)
+    run = integrate(specimen, STILL, 0.02, "reference", start)
     assert run.outcome is Outcome.REACHED_END
     after, before = (chain_energies(chain, each[None]).sum() for each in (run.final_state, start))
     assert after == pytest.approx(before, rel=1e-6)
@@ -93,15 +85,3 @@ def test_a_failed_chain_run_ends_at_its_last_valid_state(contact, gaps):
         ratio = chain_energies(chain, run.final_state).sum() / chain_energies(chain, start).sum()
         assert run.outcome is not Outcome.REACHED_END or ratio == pytest.approx(1.0, abs=0.01)
         assert ratio < 1.01
-
-
-@pytest.mark.parametrize("drive", [Harmonic(220.0, 40e-6), LinearSweep(100.0, 300.0, 0.2, 20e-6)])
-def test_a_chain_of_one_cell_equals_the_specimen_bit_for_bit(drive):
-    start = np.array([1e-5, 0.0, 2e-5, 0.1, -0.05, 0.0])
-    chain = chain_of(gong2025(), 1)
-    ours = integrate_chain(chain, drive, 0.2, "standard", start[None, :], sample_rate_hz=1e3)
-    theirs = integrate(gong2025(), drive, 0.2, "standard", start, sample_rate_hz=1e3)
-    np.testing.assert_array_equal(ours.states[:, 0], theirs.states)
-    np.testing.assert_array_equal(ours.final_state[0], theirs.final_state)
-    assert ours.impacts.per_cell.tolist() == [theirs.impacts.count]
-    assert ours.impacts.count > 10

@@ -97,17 +97,11 @@ def test_sixty_four_strongly_driven_cells_stay_finite():
     assert run.impacts.per_cell.sum() == run.impacts.count
 
 
-def test_a_chain_run_ended_by_too_many_impacts_reports_this_and_keeps_its_results():
+def test_a_chain_run_with_too_many_impacts_gives_a_reason_and_keeps_its_results():
     run = integrate_chain(chain_of(gong2025(), 2), HARD, 2.0, max_impact_rate_hz=10.0)
     assert run.outcome is Outcome.TOO_MANY_IMPACTS
     assert run.impacts.count == 2 * (20 + 100)
     assert 0.0 < run.end_time_s < 2.0
-
-
-def test_an_overflowing_motion_ends_as_not_finite():
-    fast = [[0.0, 0.0, 0.0, 1e160, -1e160, 1e160]] * 2
-    run = integrate_chain(chain_of(gong2025(), 2), Harmonic(220.0, 1e-6), 0.1, initial_state=fast)
-    assert run.outcome is Outcome.NOT_FINITE
 
 
 @pytest.mark.parametrize(

@@ -2,9 +2,10 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from tests.sim.chain.chain_matrices import chain_modal_form
+from tests.sim.chain.chain_matrices import chain_state_matrix
 from vibench.sim import Harmonic, Outcome, gong2025, lyapunov_exponent
 from vibench.sim.chain import chain_lyapunov_exponent, chain_of
 
@@ -16,9 +17,19 @@ CHAOTIC = Harmonic(260.0, 5e-6)
 def test_the_exponent_of_a_chain_without_contact_is_the_slowest_decay():
     chain = chain_of(gong2025(contact="linear", damping_time_s=2e-4), 2)
     found = chain_lyapunov_exponent(chain, Harmonic(150.0, 1e-6), duration_s=2.0, settle_s=0.0)
-    slowest = float(chain_modal_form(chain).rates.real.max())
+    slowest = np.linalg.eigvals(chain_state_matrix(chain)[0]).real.max()
     assert found.local_exponents_per_s[-50:].mean() == pytest.approx(slowest, rel=1e-2)
     assert found.impacts == 0
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("cells", [1, 2])
+def test_a_slow_drive_does_not_change_the_exponent_of_a_chain(cells):
+    chain = chain_of(gong2025(), cells)
+    found = chain_lyapunov_exponent(chain, Harmonic(0.05, 1e-6), duration_s=6.0, settle_s=0.1)
+    slowest = np.linalg.eigvals(chain_state_matrix(chain)[0]).real.max()
+    assert abs(found.exponent_per_s - slowest) < 4.0 * found.standard_error_per_s
+    assert found.exponent_per_s == pytest.approx(slowest, rel=0.01)
 
 
 def test_the_exponent_of_one_chaotic_cell_matches_the_tangent_flow_within_the_errors():
@@ -36,16 +47,3 @@ def test_a_chain_run_with_too_many_impacts_has_no_exponent():
     assert found.outcome is Outcome.TOO_MANY_IMPACTS
     assert math.isnan(found.exponent_per_s)
     assert math.isnan(found.standard_error_per_s)
-
-
-@pytest.mark.parametrize("duration_s", [0.01, math.inf])
-def test_a_duration_that_can_give_no_error_is_refused_with_a_readable_message(duration_s):
-    with pytest.raises(
-        ValueError, match=r"^Duration .* s is not allowed for an exponent at 260\.0 Hz: .*\.$"
-    ):
-        chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=duration_s)
-
-
-def test_an_exponent_that_needs_too_many_windows_is_refused():
-    with pytest.raises(ValueError, match=r"of 1 cells are not allowed: they need .* Shorten the run"):
-        chain_lyapunov_exponent(chain_of(gong2025(), 1), CHAOTIC, duration_s=1e9)

@@ -21,7 +21,7 @@ def impulse_response(chain, later):
 
 
 @pytest.mark.parametrize("damping_time_s", [0.0, 2e-5, 1e-4])
-def test_the_response_of_a_cell_to_another_within_a_window_stays_below_its_bound(damping_time_s):
+def test_the_response_of_a_cell_to_another_cell_within_a_window_stays_below_its_bound(damping_time_s):
     chain = chain_of(gong2025(damping_time_s=damping_time_s), 4)
     window = 40e-6
     bounds = cross_answers(markov_between(chain), window)
@@ -32,13 +32,6 @@ def test_the_response_of_a_cell_to_another_within_a_window_stays_below_its_bound
             for j in range(4):
                 if i != j:
                     assert relative[i, j] <= bounds[abs(i - j)] * (1.0 + 1e-6) + 1e-15
-
-
-def test_the_coupling_of_neighbouring_cells_grows_with_the_3rd_or_6th_power_of_time():
-    for damping_time_s, order in ((2e-5, 3.0), (0.0, 6.0)):
-        between = markov_between(chain_of(gong2025(damping_time_s=damping_time_s), 2))
-        coarse, fine = (cross_answers(between, window)[1] for window in (1e-6, 0.5e-6))
-        assert np.log2(coarse / fine) == pytest.approx(order, abs=0.1)
 
 
 @pytest.mark.parametrize("accuracy", list(Accuracy))

@@ -139,11 +139,17 @@ def follow(engine, tables, state, tolerance, draws):
     motions["record"] = np.where(
         draws.random(9) < 0.7, records.ctypes.data + records.strides[0] * np.arange(9), 0
     )
+    tangents = engine.rows("Tangent", 9)
+    tangents["changes"], tangents["rows"] = 1, draws.standard_normal((9, 6, 6))
+    growth, struck = np.zeros((9, room)), np.zeros((9, room), np.int64)
+    carried = draws.random(9) < 0.5
+    for name, own in (("tangent", tangents), ("growth", growth), ("struck", struck)):
+        motions[name] = np.where(carried, own.ctypes.data + own.strides[0] * np.arange(9), 0)
     batch = engine.new("Batch", count=9, tolerance=tolerance)
     batch["motions"], batch["fit"] = motions.ctypes.data, fit.ctypes.data
     for _ in range(draws.integers(3)):
-        broken = (batch, fit, motions[4], states[draws.integers(9)], records[draws.integers(9)])
-        corrupt(broken[draws.integers(5)], draws)
+        broken = (batch, fit, motions[4], states[draws.integers(9)], records[draws.integers(9)], tangents[4])
+        corrupt(broken[draws.integers(6)], draws)
     batch["count"] = min(int(batch["count"]), 9)
     motions["periods"] = np.minimum(motions["periods"], room)
     try:

@@ -69,7 +69,7 @@ def test_a_motion_does_not_depend_on_the_division_of_the_base_motion_into_interv
 
 
 @pytest.mark.parametrize("contact", LAWS)
-def test_a_run_split_between_intervals_equals_the_whole_bit_for_bit(contact):
+def test_a_run_split_between_intervals_equals_the_whole_run_bit_for_bit(contact):
     specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 40e-6, 0.05, 2e-5)
     whole, record = advance(specimen, pieces, 2e-5)
     run, parts = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(100_000)
@@ -87,7 +87,7 @@ def test_standard_accuracy_differs_from_reference_accuracy_by_no_more_than_promi
     assert np.max(np.abs(run.motion - exact.motion) / UNITS) < Accuracy.STANDARD.promise
 
 
-def test_a_run_ends_at_the_first_impact_for_which_there_is_no_room():
+def test_a_run_ends_at_the_first_impact_that_the_record_cannot_hold():
     specimen, pieces = gong2025(), sine_pieces(130.0, 20e-6, 0.2, 2e-5)
     _, whole = advance(specimen, pieces, 2e-5)
     run, record = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(5)

@@ -116,19 +116,6 @@ def test_arrays_of_wrong_size_or_type_are_refused_by_the_engine():
             engine.new("Interpolation", **arrays | {"samples": wrong})
 
 
-def test_threads_share_tables_and_give_the_same_motion():
-    engine, specimen, drive = native_engine(), gong2025(), Harmonic(130.0, 20e-6)
-
-    def motion(_):
-        run = NativeRun(specimen, drive, np.zeros(6), 3e-7, engine=engine)
-        run.advance(0.2, RunRecord(1000))
-        return run.motion
-
-    with ThreadPoolExecutor(4) as pool:
-        motions = list(pool.map(motion, range(8)))
-    assert all(np.array_equal(each, motions[0]) for each in motions)
-
-
 def test_a_scene_with_impossible_values_is_refused():
     engine, specimen = native_engine(), gong2025()
     scene = scene_of(engine, specimen, Harmonic(130.0, 20e-6))

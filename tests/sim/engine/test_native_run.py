@@ -23,14 +23,6 @@ def native(specimen, drive, duration_s, accuracy="standard", start=None, first_s
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_standard_accuracy_differs_from_reference_accuracy_by_no_more_than_promised(law):
-    specimen, drive = gong2025(contact=law), Harmonic(130.0, 20e-6)
-    quick, _, _ = native(specimen, drive, 1.0)
-    exact, _, _ = native(specimen, drive, 1.0, "reference")
-    assert distance(quick.motion, exact.motion) < Accuracy.STANDARD.promise
-
-
-@pytest.mark.parametrize("law", LAWS)
 def test_random_scenes_match_an_integration_with_strict_steps(law):
     draws = np.random.default_rng(45)
     for _ in range(12):

@@ -9,6 +9,7 @@ from tests.sim.as_written import free_state_matrix
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
 from vibench.sim.exponents.lyapunov import FEWEST_INTERVALS, ExponentVerdict, Precision, Source
 from vibench.sim.exponents.tangent_run import FinalMotion
+from vibench.sim.periodic.shooting import flow_derivative, periodic_orbit
 
 CHAOS = Harmonic(260.0, 5e-6)
 
@@ -32,7 +33,7 @@ def test_the_exponent_without_impacts_is_the_slowest_decay_rate(contact):
     assert found.local_exponents_per_s[50:].mean() == pytest.approx(found.exponent_per_s, abs=0.05)
 
 
-def test_exponents_agree_with_what_the_paper_states_on_chaos():
+def test_exponents_agree_with_what_the_paper_states_about_chaos():
     # Paper, section 3.1 and Fig. 10: above 100 per second with collisions at 5 um; about zero at 1 um.
     colliding = lyapunov_exponent(gong2025(), CHAOS)
     assert colliding.verdict is ExponentVerdict.CHAOTIC
@@ -43,11 +44,37 @@ def test_exponents_agree_with_what_the_paper_states_on_chaos():
         assert still.exponent_per_s < 4.0
 
 
-def test_the_exponent_of_a_periodic_motion_from_its_multipliers_matches_the_averaged_one():
+def test_the_exponent_computed_from_the_multipliers_of_a_periodic_motion_matches_the_averaged_exponent():
     found = lyapunov_exponent(gong2025(), Harmonic(130.0, 20e-6), duration_s=10.0)
     assert found.source is Source.MULTIPLIERS
     assert found.standard_error_per_s < 1e-3
     assert found.exponent_per_s == pytest.approx(found.local_exponents_per_s[-300:].mean(), abs=0.3)
+
+
+@pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(59.62, 1.26e-4), (31.27, 6.2e-4)])
+def test_the_exponent_of_a_run_that_still_approaches_its_periodic_motion_is_the_one_of_this_motion(
+    frequency_hz, amplitude_m
+):
+    specimen, drive = gong2025(), Harmonic(frequency_hz, amplitude_m)
+    found = lyapunov_exponent(specimen, drive, duration_s=10.0)
+    assert found.source is Source.MULTIPLIERS
+    state, period_s = periodic_orbit(specimen, drive, start=found.final_state).state, 1.0 / frequency_hz
+    _, derivative = flow_derivative(specimen, drive, state, period_s)
+    exact = math.log(np.abs(np.linalg.eigvals(derivative)).max()) / period_s
+    assert found.exponent_per_s == pytest.approx(exact, rel=1e-10)
+    assert abs(found.exponent_per_s - exact) <= 2.0 * found.standard_error_per_s
+
+
+@pytest.mark.parametrize("frequency_hz", [3.0, 15.0, 21.018, 23.0])
+@pytest.mark.parametrize("contact", ["power:3", "power:47"])
+def test_the_exponent_of_a_tiny_motion_with_a_smooth_law_is_the_slowest_decay_within_its_error(
+    contact, frequency_hz
+):
+    specimen = gong2025(contact=contact)
+    found = lyapunov_exponent(specimen, Harmonic(frequency_hz, 1e-9))
+    off = abs(found.exponent_per_s - slowest_decay(specimen))
+    assert off <= 2.0 * found.standard_error_per_s + 1e-12
+    assert off < 1e-3
 
 
 def test_an_exponent_run_ends_as_soon_as_its_error_is_small_enough():
@@ -70,8 +97,8 @@ def test_the_exponent_of_a_failed_run_is_missing_with_a_reason():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"duration_s": 0.1}, f"request {FEWEST_INTERVALS} or more"),
-        ({"duration_s": -1.0}, "the first > 0"),
+        ({"duration_s": 0.1}, f"request {FEWEST_INTERVALS} intervals or more"),
+        ({"duration_s": -1.0}, "the duration > 0"),
         ({"settle_s": math.inf}, "both must be finite"),
         ({"interval_s": 0.0}, "Interval 0.0 s is not allowed"),
         ({"initial_state": np.zeros(5)}, "six finite numbers"),

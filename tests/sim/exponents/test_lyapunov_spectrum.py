@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent, lyapunov_spectrum
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Outcome,
+    gong2025,
+    lyapunov_exponent,
+    lyapunov_spectrum,
+    periodic_orbit,
+)
 from vibench.sim.exponents.lyapunov import ExponentVerdict, Source
 from vibench.sim.exponents.lyapunov_spectrum import kaplan_yorke
 from vibench.sim.specimen.modes import state_matrix
@@ -57,6 +65,16 @@ def test_exponents_without_damping_form_pairs_of_opposite_sign(contact):
     )
 
 
+@pytest.mark.parametrize(
+    ("contact", "drive"),
+    [("linear", CHAOS), ("hertz", Harmonic(140.0, 5e-7)), ("power:3", Harmonic(90.0, 1e-9))],
+)
+def test_an_undamped_motion_without_growth_is_neither_chaotic_nor_regular(contact, drive):
+    specimen = gong2025(damping_time_s=0.0, contact=contact)
+    assert lyapunov_spectrum(specimen, drive, duration_s=3.0).verdict is ExponentVerdict.NEUTRAL
+    assert lyapunov_exponent(specimen, drive, duration_s=3.0).verdict is ExponentVerdict.NEUTRAL
+
+
 def test_the_first_of_six_exponents_is_the_largest():
     six = lyapunov_spectrum(gong2025(), CHAOS)
     one = lyapunov_exponent(gong2025(), CHAOS)
@@ -72,6 +90,26 @@ def test_exponents_without_impacts_are_the_decay_rates_of_the_modes():
     assert found.source is Source.MODES
     assert found.exponents_per_s == pytest.approx(np.sort(np.linalg.eigvals(system).real)[::-1])
     assert found.dimension == 0.0
+
+
+@pytest.mark.parametrize(
+    ("contact", "drive", "duration_s"),
+    [
+        ("power:5", Harmonic(91.57, 5e-6), 10.0),  # two pairs of complex multipliers
+        ("hertz", Harmonic(130.0, 20e-6), 4.0),
+        ("hertz", Harmonic(121.0, 20e-6), 25.0),  # slow transient: the multipliers have modulus 0.997
+        ("hunt_crossley:0.5", Harmonic(130.0, 20e-6), 4.0),
+    ],
+)
+def test_exponents_of_a_periodic_motion_are_those_of_its_floquet_multipliers(contact, drive, duration_s):
+    specimen = gong2025(contact=contact)
+    found = lyapunov_spectrum(specimen, drive, duration_s=duration_s)
+    orbit = periodic_orbit(specimen, drive, start=found.final_state)
+    exact = drive.frequency_hz * np.log(np.abs(orbit.floquet_multipliers))
+    low, high = found.intervals_per_s().T
+    assert found.source is Source.MULTIPLIERS
+    assert np.all((low <= exact) & (exact <= high))
+    assert found.exponents_per_s == pytest.approx(exact, abs=1e-4)
 
 
 @pytest.mark.parametrize(("drive", "left"), [(Harmonic(130.0, 20e-6), 4), (CHAOS, 5)])

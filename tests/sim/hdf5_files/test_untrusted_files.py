@@ -2,7 +2,7 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.sim.hdf5_files.door import UnsafeHdf5, allow_external_data, open_hdf5, walk
+from vibench.sim.hdf5_files import UnsafeHdf5, allow_external_data, open_hdf5, walk
 
 
 def external_storage(file):

@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
-from vibench.sim import Hertz, MotionKind, gong2025, integrate
+from vibench.sim import Hertz, gong2025, integrate
 from vibench.sim.engine.batch import batches_pay
 from vibench.sim.maps import Map, Range, Spacing, estimate_map, map_solver, solve_map
 from vibench.sim.maps._map import contact_energy_j
 from vibench.sim.scene.prediction import Method
-from vibench.sim.scene.solve import InBatches, Question, settle_scene, solve_scene, solve_scenes
+from vibench.sim.scene.solve import InBatches, Question, settle_scene, solve_scene
 from vibench.sim.study import InvalidStudy
 
 FREQUENCIES = Range(start=100.0, stop=300.0, points=5)
@@ -186,31 +185,6 @@ def test_independent_points_of_one_specimen_are_computed_in_batches(said, lanes)
     assert ("SIMD" in estimate_map(plan, 1).sentence) is lanes
 
 
-def test_the_settling_of_a_scene_does_not_depend_on_other_scenes_of_its_batch():
-    plan = Map(frequency_hz=Range(start=240.0, stop=280.0, points=5), amplitude_m=LEVELS, periods=1200)
-    scenes = [plan.scene((row, 0, column)) for row in (0, 1) for column in range(5)]
-    together = [each.prediction for each in solve_scenes(scenes, Question.MOTION)]
-    assert sum(each.period is None for each in together) >= 3
-    for number in (1, 6, 8):
-        alone = solve_scenes([scenes[number]], Question.MOTION)[0].prediction
-        assert alone.final_state == together[number].final_state
-        assert (alone.response_i, alone.response_ii) == (
-            together[number].response_i,
-            together[number].response_ii,
-        )
-
-
-@pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(130.0, 2e-5), (95.0, 5e-6)])
-def test_a_periodic_motion_has_the_same_responses_in_batches(frequency_hz, amplitude_m):
-    plan = Map(frequency_hz=Range(start=50.0, stop=frequency_hz, points=2), amplitude_m=amplitude_m)
-    alone = settle_scene(plan.scene((0, 1)))
-    beside = solve_scenes([plan.scene((0, 1))], Question.MOTION)[0].prediction
-    assert alone.motion is beside.motion is MotionKind.PERIODIC
-    assert alone.period == beside.period
-    assert beside.response_i == pytest.approx(alone.response_i, rel=1e-5)
-    assert beside.response_ii == pytest.approx(alone.response_ii, rel=1e-5)
-
-
 def test_a_map_along_one_quantity_stores_one_state_per_drive_period():
     plan = Map(frequency_hz=Range(start=120.0, stop=130.0, points=3), amplitude_m=2e-5, chain=("up", "down"))
     results = solve_map(plan, workers=1)
@@ -253,31 +227,12 @@ def test_a_map_with_an_error_target_stores_the_errors_of_its_points():
     assert "error_estimate" not in {column.name for column in plan.model_copy(update={"error": None}).columns}
 
 
-def test_a_diagram_with_an_error_target_stores_one_state_per_drive_period():
-    plan = Map(frequency_hz=Range(start=120, stop=140, points=3), amplitude_m=2e-5, error=0.01, chain=["up"])
-    results = solve_map(plan)
-    assert np.all(np.isfinite(results.arrays["section_x"][:, 0]))
-    assert np.all(results.arrays["error_estimate"] <= 0.01)
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"accuracy": "quick"}, "accuracy was given with an error or a time"),
-        ({"observe": ["response", "lyapunov"]}, "a target is not allowed with lyapunov"),
-        ({"error": 2.0}, "less than 1"),
-    ],
-)
-def test_options_fixed_by_an_error_target_of_a_map_are_refused(given, said):
-    with pytest.raises(ValidationError, match=f"(?i){said}"):
-        Map(**{"frequency_hz": Range(start=120, stop=140, points=3), "error": 0.01, **given})
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("target", [{"error": 0.01}, {"time_s": 3.0}])
 def test_the_cost_estimate_of_a_map_with_an_error_target_comes_from_a_pilot_run(target):
     plan = Map(frequency_hz=Range(start=250, stop=270, points=9), amplitude_m=50e-6, **target)
     told = estimate_map(plan, 1)
-    assert told.work_s > 9 * (0.5 if "error" in target else 2.9)
+    # For 1 %, a chaotic point takes tenths of a second; the time depends on the processor.
+    assert told.work_s > 9 * (0.05 if "error" in target else 2.9)
     assert told.work_s <= told.longest_work_s
-    assert "from a pilot run of a few points" in told.sentence
+    assert "based on a pilot run of a few points" in told.sentence

@@ -39,7 +39,7 @@ def test_computed_cells_of_an_adaptive_map_equal_the_full_map(adaptive):
     assert low * adaptive.audit.filled <= wrong <= high * adaptive.audit.filled
 
 
-def test_the_shares_of_a_map_are_those_of_its_points_corrected_by_the_audit(adaptive):
+def test_the_shares_of_a_map_are_the_shares_of_its_points_corrected_by_the_audit(adaptive):
     assert sum(each.share.share for each in adaptive.motions) == pytest.approx(1.0)
     audit, cells = adaptive.audit, adaptive.plan.grid.size
     for number, motion in enumerate(adaptive.motions):
@@ -78,7 +78,7 @@ def test_shares_over_common_initial_states_have_the_uncertainty_of_these_states(
             assert each.share.high >= of_starts.high - 1e-12
 
 
-def test_a_basin_map_shows_that_attractors_return_after_a_small_kick():
+def test_a_basin_map_shows_that_periodic_motions_return_after_a_small_kick():
     plan = Map(
         frequency_hz=160.0,
         amplitude_m=4e-6,
@@ -97,7 +97,7 @@ def test_a_basin_map_shows_that_attractors_return_after_a_small_kick():
 
 
 def test_stability_under_kicks_is_given_only_by_a_basin_map(adaptive):
-    with pytest.raises(InvalidStudy, match="that varies only the start"):
+    with pytest.raises(InvalidStudy, match="only the initial state varies"):
         kick_stability(adaptive)
     with pytest.raises(InvalidStudy, match="-3 kicks were requested; give 1 or more"):
         kick_stability(adaptive, kicks=-3)
@@ -165,7 +165,7 @@ def test_a_map_file_with_changed_values_or_plan_is_refused(tmp_path):
         file["study_json"][()] = file["study_json"][()].replace(b'"amplitude_m":5e-6', b'"amplitude_m":6e-6')
 
     for change, number in ((change_value, 1), (change_plan, 0)):
-        with pytest.raises(StudyError, match=f"point {number} has other values than were computed"):
+        with pytest.raises(StudyError, match=f"point {number} has other values than those computed"):
             open_map(changed(tmp_path / "map.h5", change))
 
 

@@ -82,7 +82,7 @@ def test_both_folds_of_a_snap_through_are_located():
     assert points[-1].point[-1] == 1.0
 
 
-def test_a_branch_that_turns_back_in_a_kink_is_followed_across_it():
+def test_a_branch_that_turns_back_in_a_kink_is_followed_across_the_kink():
     points = list(trace(Kink(), np.array([-1.0, -1.0]), 1.0, (-1.0, 1.0), ArcSteps()))
     assert points[-1].end is ArcEnd.REACHED_BOUND
     assert points[-1].point == pytest.approx([1.0, -1.0], abs=1e-12)

@@ -21,7 +21,7 @@ def test_a_polynomial_exponent_of_two_hundred_neither_overflows_nor_hides_a_zero
 
 
 @given(st.floats(-3.0, 3.0), st.floats(0.3, 5.0))
-def test_zeros_of_a_polynomial_scale_with_its_variable(shift, exponent):
+def test_the_zeros_of_a_polynomial_scale_with_the_variable(shift, exponent):
     coefficients, exponents = np.array([2.0, -7.0, 3.0, -0.1]), np.array([0.0, 1.0, 2.5, 4.0])
     plain = positive_zeros(coefficients, exponents)
     scale = 10.0**shift

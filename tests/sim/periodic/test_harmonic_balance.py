@@ -78,23 +78,6 @@ def test_the_largest_displacement_matches_the_exact_orbit(exact_orbit):
     assert found.response_i[3] == pytest.approx(largest / drive.amplitude_m, rel=1e-5)
 
 
-def test_the_power_of_the_drive_equals_the_power_of_damping(exact_orbit):
-    specimen, drive, _, _ = exact_orbit
-    found = balance_of(exact_orbit, 401)
-    omega = 2.0 * math.pi * drive.frequency_hz
-    base = np.where(found.harmonics == 1, -1j * drive.amplitude_m, 0.0)
-    x, y, z = found.displacements.T
-    speed = omega * found.harmonics
-    taken = 0.5 * sum(
-        c * np.sum(np.abs(speed * part) ** 2)
-        for c, part in zip(specimen.dampings, (base - x, y - z, z - x), strict=True)
-    )
-    k0, c0 = specimen.stiffnesses[0], specimen.dampings[0]
-    given = 0.5 * np.sum(((k0 + 1j * speed * c0) * (base - x) * np.conj(1j * speed * base)).real)
-    # The stops are elastic, up to the quadrature of their force.
-    assert given == pytest.approx(taken, rel=5e-4)
-
-
 def test_a_balance_with_too_few_harmonics_is_reported(exact_orbit):
     few = balance_of(exact_orbit, 21)
     assert few.outcome is BalanceEnd.NO_SOLUTION
@@ -110,13 +93,6 @@ def test_harmonic_balance_without_a_spring_gives_the_exact_linear_response(kept)
     assert found.outcome is BalanceEnd.CONVERGED
     assert found.response_ii == pytest.approx(np.abs(base_transmissibility(specimen, 266.0)[0]), rel=1e-10)
     assert found.response_i == pytest.approx(found.response_ii, rel=1e-8)
-
-
-def test_a_balanced_motion_that_does_not_reach_the_stops_is_the_linear_one():
-    specimen = gong2025()
-    found = balance(structure_of(specimen), spring_of(specimen), 60.0, 1e-6)
-    assert found.left_out == 0.0
-    assert found.response_ii == pytest.approx(np.abs(base_transmissibility(specimen, 60.0)[0]), rel=1e-10)
 
 
 @pytest.mark.parametrize("exponent", [3, 5, 47])
@@ -137,7 +113,7 @@ def test_harmonic_balance_with_one_harmonic_is_the_analytical_solution_of_the_pa
         GapSpring(100.0, 1.5, 0.5, 0.8, loss=0.3, beside=40.0),
     ],
 )
-def test_the_jacobian_and_both_parameter_derivatives_are_those_of_the_residual(spring):
+def test_the_jacobian_and_both_parameter_derivatives_are_the_derivatives_of_the_residual(spring):
     structure = two_masses(0.03)
     problem = BalanceProblem(structure, spring, harmonics_up_to(7, HarmonicSet.ALL))
     unknowns = np.random.default_rng(5).normal(size=problem.size)

@@ -44,7 +44,7 @@ def test_the_derivative_of_the_map_over_two_periods_is_the_product_of_the_single
 
 
 @pytest.mark.parametrize(("contact", "power"), [("hertz", 1.0), ("linear_gap", 0.5)])
-def test_past_grazing_the_map_derivative_changes_with_the_exponent_of_the_contact_law(contact, power):
+def test_beyond_grazing_the_map_derivative_changes_with_the_exponent_of_the_contact_law(contact, power):
     # The duration of a contact of depth d is as d^0.5, its stiffness as d^0.5 (Hertz) or constant.
     specimen = gong2025(contact=contact)
     motion = base_transmissibility(specimen, DRIVE.frequency_hz)[0]

@@ -13,7 +13,6 @@ from vibench.sim.specimen.modes import base_transmissibility
     ("of", "band_hz"),
     [
         (PhaseReference.RELATIVE, (92.0, 97.0)),
-        (PhaseReference.ABSOLUTE, (250.0, 280.0)),
         (PhaseReference.ABSOLUTE, (480.0, 520.0)),
     ],
 )
@@ -47,31 +46,23 @@ def test_the_motion_at_phase_resonance_of_a_hardening_mode_is_periodic_with_90_d
 
 
 @pytest.mark.parametrize(
-    ("band_hz", "levels_m", "said"),
+    ("specimen", "band_hz", "levels_m", "said"),
     [
-        ((102.0, 107.0), (1e-8, 1e-6), "give a band around one mode"),
-        ((92.0, 97.0), (1e-6, 2e-6), "m1 reaches its stops"),
-        ((92.0, 97.0), (2e-7, 1e-7), "ascending"),
+        (gong2025(), (102.0, 107.0), (1e-8, 1e-6), "give a band around one mode"),
+        (gong2025(), (92.0, 97.0), (1e-6, 2e-6), "m1 reaches its stops"),
+        (gong2025(), (92.0, 97.0), (2e-7, 1e-7), "ascending"),
+        (gong2025(), (50.0, 600.0), (1e-8, 1e-7), r"degrees at 94\.6"),
+        (gong2025(0.0), (92.0, 97.0), (1e-8, 1e-7), "without damping has no phase resonance"),
     ],
 )
-def test_a_frequency_band_without_phase_resonance_is_refused(band_hz, levels_m, said):
+def test_a_frequency_band_without_a_single_phase_resonance_is_refused(specimen, band_hz, levels_m, said):
     with pytest.raises(ValueError, match=said):
-        phase_resonance_branch(gong2025(), band_hz, levels_m)
+        phase_resonance_branch(specimen, band_hz, levels_m)
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("low_m", [0.1e-6, 0.3e-6])
 def test_a_phase_resonance_is_refused_if_its_newton_iteration_fails(low_m):
     """Its last iterate at 17 Hz was once returned as a motion in a band of 92 to 97 Hz."""
-    with pytest.raises(ValueError, match="No motion with this phase is found"):
+    with pytest.raises(ValueError, match="no motion with this phase is found"):
         phase_resonance_branch(gong2025(contact="power:3"), (92.0, 97.0), (low_m, 1.05 * low_m))
-
-
-def test_a_phase_resonance_band_with_several_modes_is_refused_with_their_frequencies():
-    with pytest.raises(ValueError, match=r"is at 94\.6"):
-        phase_resonance_branch(gong2025(), (50.0, 600.0), (1e-8, 1e-7))
-
-
-def test_an_undamped_specimen_has_no_phase_resonance():
-    with pytest.raises(ValueError, match="without damping has no phase resonance"):
-        phase_resonance_branch(gong2025(0.0), (92.0, 97.0), (1e-8, 1e-7))

@@ -64,11 +64,11 @@ def test_a_scene_plan_states_its_cost_with_the_uncertainty_and_the_source(ledger
     assert "too few such runs" in plan_scene(scene).explain()
     for _ in range(FEWEST):
         learn_cost(scene, 1e-3)
-    assert "0.001 s within a factor of 1.5, from 3 such runs on this machine" in plan_scene(scene).explain()
+    assert "0.001 s within a factor of 1.5, based on 3 such runs on this" in plan_scene(scene).explain()
 
 
 def test_an_estimate_with_a_large_uncertainty_is_stated_as_a_range():
-    assert "core: between 0.001 and 9 s, from too few such runs on this" in str(ExpectedTime(0.1, 86.0, 0))
+    assert "core: between 0.001 and 9 s, based on too few such runs" in str(ExpectedTime(0.1, 86.0, 0))
 
 
 def test_computing_times_of_larger_budgets_are_learnt_separately(ledger):

@@ -21,7 +21,7 @@ def campaign():
 def test_stated_errors_hold_and_error_targets_are_met_for_fixed_initial_states(campaign, index):
     _, scene = campaign["random_scene"](SEED, index)
     for target in campaign["solve_and_measure"](scene, 60.0)["targets"]:
-        assert target["kind"] in {"periodic", "named window"}
+        assert target["kind"] in {"periodic", "not repeating"}
         assert target["is_met"]
         assert all(target["covered"]), target
         assert target["stated"] <= target["error"]

@@ -12,7 +12,7 @@ LOST_E = 10.0
 
 
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(300.0, 20e-6), (200.0, 30e-6)])
-def test_the_growth_of_perturbations_is_the_product_of_growth_over_parts_of_a_run(frequency_hz, amplitude_m):
+def test_the_growth_of_perturbations_over_a_run_is_the_product_over_its_parts(frequency_hz, amplitude_m):
     drive = Harmonic(frequency_hz, amplitude_m)
     whole = FollowedRun(gong2025(), drive, Accuracy.STANDARD.tolerance, np.zeros(6))
     whole.follow_tangent()

@@ -13,15 +13,8 @@ def ledger(tmp_path):
     return CostLedger(tmp_path / "costs" / "here.json")
 
 
-def test_a_cost_estimate_without_earlier_runs_keeps_its_wide_factor(ledger):
-    expected = ledger.expected_time(KIND, 2.0)
-    assert (expected.time_s, expected.runs) == (2.0, 0)
-    assert expected.factor >= 10.0
-    assert "too few such runs" in str(expected)
-
-
 @pytest.mark.parametrize("scatter", [0.05, 0.4, 1.0])
-def test_the_stated_cost_factor_has_its_coverage(ledger, scatter):
+def test_the_stated_cost_factor_has_its_stated_coverage(ledger, scatter):
     random = np.random.default_rng(7)
     held = []
     for run in range(600):
@@ -48,6 +41,15 @@ def test_costs_of_a_new_kind_of_run_are_taken_from_the_nearest_kind(ledger):
         ledger.learn("polynomial/power/standard", 1.0, 4.0)
     assert ledger.expected_time("event driven/hertz/quick", 1.0).time_s == pytest.approx(0.5)
     assert ledger.expected_time("polynomial/power/quick", 1.0).time_s == pytest.approx(4.0)
+
+
+def test_a_few_scattered_runs_of_a_kind_count_less_than_similar_runs(ledger):
+    """The mean of three short runs, 0.31 s, was the next estimate."""
+    for place in range(MEMORY):
+        ledger.learn(f"event driven/hertz/{place}", 1.0, 2.0 if place % 2 else 0.5)
+    for taken_s in (0.2, 0.5, 0.3):
+        ledger.learn("event driven/hertz/touching", 1.0, taken_s)
+    assert 0.35 < ledger.expected_time("event driven/hertz/touching", 1.0).time_s < 1.0
 
 
 def test_learnt_costs_are_stored_for_the_next_process(ledger, tmp_path):

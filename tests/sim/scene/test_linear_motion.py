@@ -63,5 +63,5 @@ def test_contact_is_excluded_only_if_a_bound_on_the_motion_proves_it():
 
 
 def test_parameters_that_cause_an_overflow_are_refused_with_a_readable_message():
-    with pytest.raises(ValueError, match="cannot be computed: its numbers are too far apart"):
+    with pytest.raises(ValueError, match="cannot be computed: the numbers are too far apart"):
         linear_motion(gong2025(1e300), DRIVE, np.zeros(6))

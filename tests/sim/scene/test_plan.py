@@ -1,8 +1,10 @@
 import time
 
+import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, Observable, Scene, gong2025, integrate, plan_scene
+from vibench.sim.scene.followed_run import FollowedRun, samples_between
 from vibench.sim.scene.plan import CLOSED_FORM_S
 from vibench.sim.scene.prediction import Method
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Given
@@ -61,6 +63,36 @@ def test_the_planned_cost_without_contact_grows_with_the_drive_periods():
         return plan_scene(Scene(gong2025(), drive, duration=length, budget_s=0.0)).planned_s
 
     assert cost(1e6) > 30.0 * cost(1e4)
+
+
+@pytest.mark.parametrize("contact", ["power:3", "power:7", "power:47", "power:3+5+7"])
+@pytest.mark.parametrize("drive", [Harmonic(130.0, 2e-5), LOUD, Harmonic(600.0, 2e-6), Harmonic(266.0, 1e-4)])
+def test_the_planned_cost_of_power_laws_agrees_with_their_nominal_cost(contact, drive):
+    """At large levels, power:47 was planned at a sixth of its cost."""
+    run = FollowedRun(gong2025(contact=contact), drive, 1e-7, np.zeros(6))
+    run.follow(0.5, samples=samples_between(drive.frequency_hz, 0.0, 0.5))
+    length = FixedDuration(0.5, 0.1)
+    planned_s = plan_scene(Scene(gong2025(contact=contact), drive, duration=length, budget_s=0.0)).planned_s
+    assert 0.4 < (planned_s - CLOSED_FORM_S) / run.cost_s < 2.5
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("is_sensitive", [False, True], ids=["", "with a tangent"])
+def test_nominal_costs_of_all_contact_laws_are_proportional_to_processor_time(is_sensitive):
+    """For polynomial forces, budgets of 0.2 s took 2 to 4 s: costs did not depend on the number of steps."""
+
+    def taken_over_nominal(contact):
+        run = FollowedRun(gong2025(2e-5, 20e-6, contact), Harmonic(266.0, 20e-6), 1e-7, np.zeros(6))
+        run.follow(0.5)
+        if is_sensitive:
+            run.follow_tangent()
+        cost_s, begins_s = run.cost_s, time.thread_time()
+        run.follow(1.5, samples=samples_between(266.0, 0.5, 1.5))
+        return (time.thread_time() - begins_s) / (run.cost_s - cost_s)
+
+    laws = ("hertz", "hunt_crossley:0.3", "linear_gap", "rigid:0.5", "power:3", "power:7", "power:47")
+    ratios = [min(taken_over_nominal(law) for _ in range(3)) for law in laws]
+    assert max(ratios) < 4.0 * min(ratios)
 
 
 @pytest.mark.thorough

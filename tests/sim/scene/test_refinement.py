@@ -11,9 +11,7 @@ from vibench.sim import (
     AutomaticDuration,
     FixedDuration,
     Harmonic,
-    Method,
     MotionKind,
-    Observable,
     Scene,
     StartMemory,
     Target,
@@ -55,7 +53,7 @@ def test_a_prediction_of_a_periodic_motion_is_within_its_stated_error(contact):
     assert np.all(errors_off(found, truth) <= 1.0)
 
 
-def test_a_periodic_motion_costs_the_same_for_a_small_and_a_large_error():
+def test_a_periodic_motion_costs_the_same_for_a_small_and_a_large_target_error():
     rough, fine = (solve_scene(target_scene(error=error)) for error in (1e-2, 1e-6))
     assert rough.response_i == fine.response_i
     assert rough.duration_s == fine.duration_s
@@ -66,9 +64,12 @@ def test_a_mean_over_initial_states_reaches_an_error_of_one_percent():
     assert found.memory is StartMemory.LOST
     assert found.target.is_met
     assert found.error_estimate <= 0.01
-    assert found.target.starts == 32
-    assert found.target.unseen_share == pytest.approx(1.0 - 0.05 ** (1.0 / 32.0))
-    assert found.target.text.endswith("; 32 starts may miss motions with shares up to 8.9 %")
+    # The scatter of chaotic motions, and so the number of starts, depends on a processor's rounding errors.
+    starts, unseen = found.target.starts, 1.0 - 0.05 ** (1.0 / found.target.starts)
+    assert starts in {16, 32}
+    assert found.target.unseen_share == pytest.approx(unseen)
+    text = f"; {starts} starts may miss motions with shares up to {100.0 * unseen:.2g} %"
+    assert found.target.text.endswith(text)
     assert "mean of" in found.ended
     again = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=0.01))
     assert again.response_ii == found.response_ii
@@ -126,13 +127,7 @@ def test_a_motion_that_never_settles_is_predicted_for_a_stated_window():
     assert np.all(errors_off(found, truth) <= 1.0)
 
 
-def test_a_motion_without_contact_is_predicted_in_closed_form():
-    found = solve_scene(target_scene(amplitude_m=1e-6, error=0.1))
-    assert found.method is Method.CLOSED_FORM
-    assert found.target.is_met
-
-
-def test_an_error_below_rounding_is_reported_as_unreachable():
+def test_a_target_error_below_rounding_is_reported_as_unreachable():
     report = solve_scene(target_scene(error=1e-15)).target
     assert not report.is_met
     assert report.needed_s is None
@@ -141,7 +136,7 @@ def test_an_error_below_rounding_is_reported_as_unreachable():
 
 
 @pytest.mark.thorough
-def test_an_unreachable_error_of_a_mean_over_initial_states_is_recognised_at_once():
+def test_an_unreachable_target_error_of_a_mean_over_initial_states_is_recognised_at_once():
     began_s = time.thread_time()
     report = solve_scene(target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=1e-12)).target
     assert time.thread_time() - began_s < 5.0
@@ -162,27 +157,7 @@ def test_a_computing_time_shorter_than_one_drive_period_is_refused():
         solve_scene(scene)
 
 
-@pytest.mark.parametrize(
-    ("given", "named"),
-    [
-        ({"accuracy": "quick"}, "accuracy"),
-        ({"duration": FixedDuration(10.0, 5.0)}, "duration"),
-        ({"budget_s": 0.0}, "budget"),
-        ({"observe": (Observable.SPECTRUM,)}, "spectrum"),
-    ],
-)
-def test_options_fixed_by_an_error_target_are_refused(given, named):
-    with pytest.raises(ValueError, match=named):
-        replace(target_scene(error=0.1), **given)
-
-
-@pytest.mark.parametrize("given", [{}, {"error": 0.0}, {"error": 1.1}, {"time_s": 0.0}, {"time_s": np.inf}])
-def test_a_target_without_a_valid_error_or_time_is_refused(given):
-    with pytest.raises(ValueError, match="not allowed"):
-        Target(**given)
-
-
-def test_a_window_length_may_be_given_with_a_target():
+def test_a_window_length_may_be_given_with_a_target_error():
     scene = target_scene(frequency_hz=260.0, amplitude_m=5e-6, error=0.05)
     found = solve_scene(replace(scene, duration=AutomaticDuration(window_s=1.0)))
     assert found.window_s == pytest.approx(1.0)
@@ -199,7 +174,7 @@ def test_the_stated_error_of_a_mean_covers_the_true_mean_in_95_percent_of_cases(
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
 @pytest.mark.parametrize("other", [0.3, 3.0])
-def test_the_stated_error_of_a_mean_over_two_motions_holds_and_is_not_too_large(share, other):
+def test_the_stated_error_of_a_mean_over_two_motions_bounds_the_true_error_closely(share, other):
     random, count = np.random.default_rng(4), 100
     true, scatter = 1.0 + share * (other - 1.0), abs(other - 1.0) * np.sqrt(share * (1.0 - share) / count)
     held, errors = [], []

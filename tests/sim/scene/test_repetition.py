@@ -66,7 +66,7 @@ def test_a_poincare_section_of_five_points_gives_no_verdict():
     ],
     ids=["steady growth", "growth that ended", "neither", "still settling", "not looked at"],
 )
-def test_growth_of_perturbations_identifies_aperiodic_motion(logarithms, kind):
+def test_the_growth_of_perturbations_identifies_an_aperiodic_motion(logarithms, kind):
     growth = Growth(np.array(logarithms), 0.5 * len(logarithms))
     assert kind_of(None, growth, fading_s=0.25) is kind
 

@@ -94,7 +94,7 @@ def test_intermittent_chaos_is_not_classified_as_a_torus():
     ],
 )
 def test_a_chaotic_motion_that_may_turn_into_another_is_not_called_final(kinds, final):
-    """Of 400 runs, 2 % were in the motion after 300 s that nine of sixteen runs had after 60 s."""
+    """After 300 s, 2 % of 400 runs had the motion that nine of sixteen runs had after 60 s."""
     counts = counts_of(kinds, range(1, len(kinds) + 1))
     assert tuple(each.is_final for each in counts) == final
     assert [each.trials for each in counts] == list(range(1, len(kinds) + 1))

@@ -46,7 +46,7 @@ def test_the_closed_form_matches_transmissibility_and_final_state():
 
 
 @pytest.mark.parametrize(("contact", "frequency_hz", "amplitude_m"), PERIODIC)
-def test_a_fixed_duration_prediction_equals_the_plain_run(contact, frequency_hz, amplitude_m):
+def test_a_prediction_of_fixed_duration_equals_the_plain_run(contact, frequency_hz, amplitude_m):
     scene = scene_of(contact, frequency_hz, amplitude_m, duration=FixedDuration(8.0, 2.0))
     found = solve_scene(scene)
     plain = steady_response(scene.specimen, scene.drive, scene.accuracy, 8.0, 2.0)
@@ -124,12 +124,6 @@ def test_chaotic_runs_from_other_initial_states_are_within_the_stated_error():
     ]
     outside = np.abs(np.array(others) / found.response_i - 1.0) > found.error_estimate
     assert np.count_nonzero(outside) < 8
-
-
-def test_a_motion_on_a_torus_is_distinguished_from_chaos():
-    found = solve_scene(scene_of("power:3", 225.0, 5e-6, duration=AutomaticDuration()))
-    assert found.motion is MotionKind.QUASI_PERIODIC
-    assert found.scatter < 1e-3
 
 
 @pytest.mark.thorough
@@ -233,7 +227,7 @@ def test_a_scene_with_too_many_steps_ends_with_an_explanation(monkeypatch):
     monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 10_000_000)
     found = solve_scene(Scene(stiff_specimen(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0)))
     assert found.outcome is Outcome.TOO_LONG
-    assert "run shorter" in found.ended
+    assert "simulate less time" in found.ended
     assert found.response_i is None
     assert found.ensemble is None
 
@@ -291,14 +285,6 @@ def test_a_window_of_too_many_drive_periods_is_refused():
     fast = Scene(gong2025(contact="power:5"), Harmonic(1e6, 1e-6), duration=FixedDuration(1e4, 5.0))
     with pytest.raises(ValueError, match=r"give 2 s or less"):
         solve_scene(fast)
-
-
-def test_a_perturbation_that_shrinks_to_zero_gives_a_valid_result():
-    """With a gap of 1e-300 m the perturbation underflows, which once raised "math domain error"."""
-    tiny = Scene(
-        gong2025(gap_m=1e-300, contact="power:5"), Harmonic(260.0, 5e-6), duration=FixedDuration(0.5, 0.2)
-    )
-    assert solve_scene(tiny).ended
 
 
 @pytest.mark.parametrize("duration", [AutomaticDuration(longest_s=20.0), FixedDuration()])

@@ -51,7 +51,7 @@ def test_the_closed_form_without_contact_equals_the_integration(seed):
     assert m0 == pytest.approx(s * moved[M0], rel=3e-3)
 
 
-def test_the_closed_form_predicts_the_base_better_with_the_specimen_than_without_it():
+def test_the_closed_form_predicts_the_base_better_with_the_specimen_than_without_the_specimen():
     rng = np.random.default_rng(7)
     off_db = []
     for _ in range(12):

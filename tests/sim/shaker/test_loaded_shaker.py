@@ -69,23 +69,11 @@ def linear_motion():
     return drive, motion
 
 
-def test_base_and_specimen_move_as_in_the_closed_form_of_the_loaded_rig(linear_motion):
+def test_the_base_and_the_specimen_move_as_in_the_closed_form_of_the_loaded_rig(linear_motion):
     drive, motion = linear_motion
     acceleration, velocity = per_volt(LINES_HZ.astype(float), gong2025())
     assert lines(motion.base_acceleration) / lines(drive) == pytest.approx(acceleration, rel=1e-3)
     assert lines(motion.m0_velocity) / lines(drive) == pytest.approx(velocity, rel=1e-3)
-
-
-def test_the_base_motion_has_a_notch_at_the_specimen_resonance(linear_motion):
-    drive, motion = linear_motion
-    measured = np.abs(lines(motion.base_acceleration) / lines(drive))
-    alone = np.abs(per_volt(LINES_HZ)[0])
-    at_resonance = np.abs(measured / alone - 1)[LINES_HZ == 266]
-    beside = np.abs(measured / alone - 1)[LINES_HZ == 777]
-    assert at_resonance > 0.03
-    assert beside < 0.02
-    acceleration, _ = per_volt(np.arange(255.0, 275.0, 0.1), gong2025())
-    assert np.min(np.abs(acceleration)) < 0.97 * alone[LINES_HZ == 266]
 
 
 def test_a_table_with_a_negligible_specimen_moves_like_the_bare_table():
@@ -105,7 +93,7 @@ def test_a_table_with_a_negligible_specimen_moves_like_the_bare_table():
 
 
 @pytest.mark.parametrize("amplitude_v", [1e-3, 0.4])
-def test_the_electrical_work_equals_heat_and_friction_and_stored_energy(amplitude_v):
+def test_the_electrical_work_equals_the_sum_of_heat_friction_and_stored_energy(amplitude_v):
     specimen = gong2025()
     table = loaded_shaker(specimen)
     drive = amplitude_v * np.sin(2 * np.pi * 260 * STEP_S * np.arange(SECOND))
@@ -170,34 +158,12 @@ def test_the_rubber_stops_limit_the_stroke_and_their_contacts_are_counted():
     assert table.structure["bumps"] > 0
 
 
-def test_a_small_drive_never_touches_the_rubber_stops():
-    table = loaded_shaker()
-    table.move(tones(0.5, [50.0]), np.zeros(SECOND))
-    assert table.structure["bumps"] == 0
-    assert table.structure["limited_steps"] == 0
-
-
 def test_a_motion_that_is_not_finite_raises_an_error_that_states_its_time():
     table = loaded_shaker()
     drive = np.zeros(100)
     drive[40] = np.nan
     with pytest.raises(MotionFailed, match="after 40 of 100 steps"):
         table.move(drive, np.zeros(100))
-
-
-def test_the_states_at_the_ends_of_steps_are_kept_only_on_request():
-    table = loaded_shaker()
-    assert table.move(np.zeros(10), np.zeros(10)).ends.shape == (0, len(MOTION_COLUMNS))
-    assert table.move(np.zeros(10), np.zeros(10), 10).ends.shape == (10, len(MOTION_COLUMNS))
-
-
-def test_two_consecutive_simulations_equal_one_simulation_of_the_whole():
-    drive = tones(0.7, [260.0])
-    whole, parts = loaded_shaker(), loaded_shaker()
-    expected = whole.move(drive, np.zeros(SECOND)).m0_velocity
-    got = [parts.move(part, np.zeros(len(part))).m0_velocity for part in np.split(drive, [1, 2, 777, 50_000])]
-    assert np.array_equal(np.concatenate(got), expected)
-    assert parts.impacts == whole.impacts > 0
 
 
 @pytest.mark.thorough

@@ -14,7 +14,7 @@ def test_the_response_of_the_free_masses_is_the_transmissibility():
     np.testing.assert_array_equal(answer.free_p, truth[:, 3])
 
 
-def test_the_response_of_the_stuck_masses_equals_that_of_joined_masses():
+def test_the_response_of_the_stuck_masses_equals_the_response_of_joined_masses():
     """A spring a million times stiffer between m1 and m2 prevents relative displacement."""
     specimen = gong2025()
     k0, k1, k2 = specimen.stiffnesses

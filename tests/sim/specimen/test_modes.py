@@ -51,15 +51,6 @@ def test_the_modes_rebuild_any_state_and_its_time_derivative(first, second, thir
     assert (form.rates.real <= 0.0).all()
 
 
-def test_the_decay_rates_of_the_modes_add_up_to_the_trace_of_the_damping():
-    form = modal_form(gong2025(damping_time_s=3e-5))
-    assert 2.0 * form.rates.real.sum() == pytest.approx(-390.081, abs=1e-3)
-
-
-def test_modes_of_an_undamped_specimen_do_not_decay():
-    assert np.abs(modal_form(gong2025(damping_time_s=0.0)).rates.real).max() < 1e-10
-
-
 def test_a_specimen_with_coinciding_eigenvalues_is_refused_with_advice():
     # m0 is critically damped and coupled to m2 only through a vanishing spring.
     k0, m0 = 1000.0, 1e-3

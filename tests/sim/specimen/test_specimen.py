@@ -19,7 +19,7 @@ def test_the_free_specimen_has_the_three_modes_of_the_paper():
     np.testing.assert_allclose(gong2025().natural_frequencies_hz, [94.6, 266.2, 499.6], atol=0.05)
 
 
-def test_the_specimen_with_joined_masses_has_the_two_terminal_resonances():
+def test_the_specimen_has_two_resonances_when_m1_is_joined_to_m2():
     np.testing.assert_allclose(gong2025().bound_frequencies_hz, [201.5, 436.0], atol=0.05)
 
 

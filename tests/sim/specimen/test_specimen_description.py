@@ -1,4 +1,4 @@
-"""A specimen file states all parameters and always gives the same specimen."""
+"""A specimen file contains all parameters and always gives the same specimen."""
 
 import math
 from dataclasses import replace
@@ -52,15 +52,6 @@ def test_the_shipped_gong2025_file_equals_the_built_in_specimen():
         "linear_gap",
         "two_masses",
     } <= shipped_specimens().keys()
-
-
-def test_a_response_of_the_gong2025_file_equals_the_built_in_specimen():
-    drive = Harmonic(130.0, 20e-6)
-    own, file = (
-        steady_response(each, drive, duration_s=1.0, window_s=0.5)
-        for each in (gong2025(), load_specimen("gong2025").specimen())
-    )
-    assert (own.response_i, own.response_ii, own.impacts) == (file.response_i, file.response_ii, file.impacts)
 
 
 @pytest.mark.parametrize("name", sorted(shipped_specimens()))
@@ -174,21 +165,6 @@ def test_a_specimen_table_given_without_a_file_cannot_name_another_file(tmp_path
     """Specimen tables in recordings and study results may name shipped specimens only."""
     with pytest.raises(ValidationError, match="no specimen that comes with vibench"):
         SpecimenTable.model_validate({"model": str(write_file(tmp_path, WHOLE))})
-
-
-def test_a_random_specimen_round_trips_through_its_file(tmp_path):
-    rng = np.random.default_rng(7)
-    for number in range(20):
-        text = (
-            f'name = "r{number}"\nmasses_kg = {rng.uniform(1e-3, 1e-2, 3).tolist()}\n'
-            f"single_frequencies_hz = {rng.uniform(50.0, 500.0, 3).tolist()}\n"
-            f"dampings_ns_per_m = {rng.uniform(0.0, 1.0, 3).tolist()}\n"
-            f'gap_m = {rng.uniform(1e-5, 1e-4, 2).tolist()}\ncontact = "hertz"\n'
-            f"hertz_stiffness = {rng.uniform(1e9, 1e10)}\n"
-        )
-        described = load_specimen(write_file(tmp_path, text))
-        again = SpecimenTable.model_validate_json(described.model_dump_json())
-        assert again.specimen() == described.specimen()
 
 
 @pytest.mark.parametrize(

@@ -136,7 +136,7 @@ def test_scenes_with_many_states_use_smaller_batches_with_equal_results(monkeypa
     assert [repr(each.prediction) for each in solve_scenes(scenes)] == together
 
 
-def test_planned_work_stays_finite_with_unsolvable_points():
+def test_planned_work_stays_finite_for_points_without_a_solution():
     study = Study(**CURVE, damping_times_s=[0.0, 1e300])
     assert np.isfinite(planned_work_s(study))
 

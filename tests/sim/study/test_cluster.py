@@ -138,7 +138,7 @@ def test_a_dead_cluster_is_reported_and_its_study_can_be_continued(
 
 
 @pytest.mark.slow
-def test_a_cluster_reports_errors_and_cancels_like_threads(cluster, long_study):
+def test_a_cluster_reports_errors_and_cancels_work_like_threads(cluster, long_study):
     _, address, _ = cluster
     executor = ClusterExecutor(address, operator.neg)
     store = MemoryStore(long_study)
@@ -160,7 +160,7 @@ def test_a_cluster_reports_errors_and_cancels_like_threads(cluster, long_study):
 
 
 @pytest.mark.thorough
-def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
+def test_a_worker_with_different_software_is_refused_before_it_computes(tmp_path):
     package = tmp_path / "other" / "vibench" / "sim"
     shutil.copytree(Path(vibench.sim.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     with (package / "contact.py").open("a") as source:
@@ -169,7 +169,7 @@ def test_a_worker_with_other_software_is_refused_before_it_computes(tmp_path):
     with (
         scheduler(tmp_path) as (_, address),
         worker(address, tmp_path, environment),
-        pytest.raises(ClusterLost, match=r"has other software, so results may differ.*sim_sources"),
+        pytest.raises(ClusterLost, match=r"has different software, so results may differ.*sim_sources"),
     ):
         ClusterExecutor(address)
 

@@ -44,7 +44,7 @@ def last_count(words):
 @pytest.mark.parametrize(
     ("kind", "kills"), [("study", 1), ("map", 1), pytest.param("map", 5, marks=pytest.mark.slow)]
 )
-def test_killed_and_resumed_results_equal_uninterrupted_results(tmp_path, kind, kills):
+def test_results_after_a_kill_and_a_resume_equal_uninterrupted_results(tmp_path, kind, kills):
     plan, solve, open_results = child.PLANS[kind]
     truth = solve(plan)
     path, luck = tmp_path / "a.h5", random.Random(kills)

@@ -9,12 +9,6 @@ def warnings_for(amplitudes_m, gaps_m=(45e-6,)):
     return list(plausibility_warnings(amplitudes_m, gaps_m))
 
 
-def test_metres_typed_instead_of_micrometres_give_a_warning_with_the_likely_value():
-    (doubt,) = warnings_for([5.0])
-    assert "5 m is 1.1e+05 times the gap of 4.5e-05 m" in doubt
-    assert doubt.endswith("give 5e-06")
-
-
 @pytest.mark.parametrize(("amplitude_m", "count"), [(5e-6, 0), (1e-3, 0), (0.0449, 0), (0.0451, 1)])
 def test_only_base_motion_over_1000_gaps_gives_a_warning(amplitude_m, count):
     assert len(warnings_for([5e-7, amplitude_m])) == count

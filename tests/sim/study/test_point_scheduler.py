@@ -34,14 +34,6 @@ def test_the_priority_of_a_study_point_includes_all_points_waiting_for_it():
     assert scheduler.take(0.1, 1) == (0,)
 
 
-def test_a_study_point_waits_until_its_predecessor_is_finished():
-    scheduler = scheduler_of([1.0, 2.0], after=[NOBODY, 0])
-    assert scheduler.take(10.0, 10) == (0,)
-    assert scheduler.take(10.0, 10) == ()
-    scheduler.finish(0)
-    assert scheduler.take(10.0, 10) == (1,)
-
-
 def test_the_successor_of_a_finished_study_point_may_start_at_once():
     scheduler = scheduler_of([1.0, 2.0, 1.0], after=[NOBODY, 0, 1], is_done=[True, False, False])
     assert scheduler.take(10.0, 10) == (1,)

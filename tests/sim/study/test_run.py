@@ -1,15 +1,22 @@
 """Running a study: reproducible results for any executor, stored errors, immediate cancellation."""
 
 import random
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.sim import Harmonic, Outcome, Rest, Scene, gong2025, solve_scene
+from vibench.sim import Harmonic, Rest, Scene, gong2025, solve_scene
 from vibench.sim.scene.scene import FixedDuration, Given
-from vibench.sim.study import MemoryStore, PointState, Study, ThreadExecutor, run_study, solve_study
+from vibench.sim.study import (
+    InvalidStudy,
+    MemoryStore,
+    PointState,
+    Study,
+    ThreadExecutor,
+    run_study,
+    solve_study,
+)
 from vibench.sim.study._executor import Reply, solve_timed
 from vibench.sim.study._grid import CONTINUES, PHASE
 from vibench.sim.study._queue import StudyEnd
@@ -108,6 +115,21 @@ def test_base_motion_is_continuous_between_chained_points_of_a_study():
     assert list(results.values(CONTINUES).ravel()) != list(range(3))
 
 
+def test_a_requested_number_selects_one_value_of_an_axis_or_is_refused():
+    levels = [5e-6, 5.000000004e-6]
+    study = Study(frequencies_hz=[260.0], amplitudes_m=levels, **SHORT)
+    results = results_of(study, MemoryStore(study).arrays)
+    results.arrays["response_i"][:] = [1.0, 2.0]
+    found = [
+        results.values("response_i", amplitude=level).item() for level in (*levels, 5e-6 * (1.0 - 4e-10))
+    ]
+    assert found == [1.0, 2.0, 1.0]
+    with pytest.raises(InvalidStudy, match=r"matches several values of amplitude; give one of 5e-06, 5.0000"):
+        results.values("response_i", amplitude=5.000000002e-6)
+    with pytest.raises(InvalidStudy, match=r"6e-06 matches no value of amplitude; give one of 5e-06"):
+        results.values("response_i", amplitude=6e-6)
+
+
 def test_predictions_name_the_initial_state_of_their_run(truth):
     starts = {(each.start, each.frequency_hz) for each in truth.predictions()}
     assert {("rest", 200.0), ("end at 200 Hz", 230.0), ("end at 260 Hz", 230.0)} <= starts
@@ -162,24 +184,6 @@ def test_an_error_in_one_scene_affects_only_its_point(small, truth):
     assert np.isnan(results.values(CONTINUES, **restarted)).all()
     rested = truth.values("response_i", start="rest", frequency=230.0)
     np.testing.assert_array_equal(results.values("response_i", **restarted), rested)
-
-
-class SolverThatStops:
-    """Solver that reports every run as stopped by too many impacts."""
-
-    def __call__(self, scene):
-        whole = solve_scene(scene)
-        return replace(
-            whole, outcome=Outcome.TOO_MANY_IMPACTS, response_i=None, ended=Outcome.TOO_MANY_IMPACTS.text
-        )
-
-
-def test_a_run_that_did_not_reach_its_end_is_marked_as_stopped(small):
-    _, results = run_with(SolverThatStops(), small)
-    assert np.all(results.state == PointState.STOPPED)
-    assert {each.outcome for each in results.predictions()} == {Outcome.TOO_MANY_IMPACTS}
-    assert {each.ended for each in results.predictions()} == {Outcome.TOO_MANY_IMPACTS.text}
-    assert {each.response_i for each in results.predictions()} == {None}
 
 
 def test_a_cancelled_study_stops_at_once_and_keeps_its_finished_points(study, require_equal):

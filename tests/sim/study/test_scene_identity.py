@@ -29,7 +29,7 @@ def test_different_scenes_have_different_identities():
     assert len(set(identities.values())) == len(identities)
 
 
-def test_equal_scenes_have_one_identity_however_they_are_constructed():
+def test_equal_scenes_have_the_same_identity_however_they_are_constructed():
     again = Scene(gong2025(2e-5, 45e-6, "hertz"), Harmonic(260.0, 5e-6, 0.0))
     assert scene_identity(again) == scene_identity(SCENE)
 

@@ -39,6 +39,14 @@ def small():
     )
 
 
+@pytest.fixture(scope="module")
+def solved(small, tmp_path_factory):
+    """Content of the file of a computed study."""
+    path = tmp_path_factory.mktemp("solved") / "a.h5"
+    solve_study(small, path)
+    return path.read_bytes()
+
+
 @pytest.fixture
 def path(small, tmp_path):
     """Return the path of a study's file without results."""
@@ -105,7 +113,7 @@ def test_motions_of_an_ensemble_round_trip_through_the_study_file(tmp_path):
 REST = Rest()
 
 
-def test_h5py_alone_finds_named_axes_units_and_missing_points(path):
+def test_h5py_alone_finds_the_named_axes_the_units_and_the_missing_points(path):
     with h5py.File(path) as file:
         response = file["response_i"]
         assert [dim.label or dim[0].name for dim in response.dims] == [
@@ -176,6 +184,10 @@ def test_stored_scene_identities_match_the_scenes(small, tmp_path):
         ({"accuracy": "quick"}, "contains another study: accuracy is standard in the file and quick in"),
         ({"amplitudes_m": [5e-6, 21e-6]}, "is 2e-05 at position 2 in the file and 2.1e-05 at position 2 in"),
         ({"amplitudes_m": [5e-6]}, "amplitudes_m is 2e-05 at position 2 in the file and 5e-06 in"),
+        (
+            {"specimen": {"model": "gong2025", "damping_time_s": 3e-5}},
+            r"specimen.damping_time_s is \S+ in the file and 3e-05 in",
+        ),
         ({"duration_s": 0.3, "window_s": 0.2}, "0.2 in the file and 0.3 in the request, window_s is 0.1"),
     ],
 )
@@ -261,21 +273,23 @@ def set_values(name, value):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (reverse, "point 0 has other values than were computed"),
-        (set_values("response_ii", 1.25), "point 0 has other values than were computed"),
+        (reverse, "point 0 has other values than those computed"),
+        (set_values("response_ii", 1.25), "point 0 has other values than those computed"),
         (replace_column, "column response_i has another size, type or storage"),
         (lambda file: file.pop("response_ii"), "response_ii"),
         (lambda file: file.attrs.pop("format_version"), "format_version"),
-        (set_values("frequency", [260.0, 200.0]), "axis frequency has other values than its study"),
+        (set_values("frequency", [260.0, 200.0]), "axis frequency do not match its study"),
         (set_values("motion", -1), "column motion has a value without a meaning"),
-        (set_values("response_i", np.nan), "column response_i lacks a number"),
+        (set_values("response_i", np.nan), "missing in its column response_i"),
         (set_values("state", 7), "states or points that do not exist"),
         (set_values("sessions/n_sessions", 5000), "out of bounds"),
     ],
 )
-def test_a_changed_study_file_is_refused_with_a_readable_message_and_kept(small, tmp_path, change, said):
+def test_a_changed_study_file_is_refused_with_a_readable_message_and_kept(
+    small, solved, tmp_path, change, said
+):
     path = tmp_path / "a.h5"
-    solve_study(small, path)
+    path.write_bytes(solved)
     with h5py.File(path, "r+") as file:
         change(file)
     before = path.read_bytes()

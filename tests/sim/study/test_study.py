@@ -27,7 +27,7 @@ def test_the_default_specimen_of_a_study_is_gong2025():
     assert (study.models, study.damping_times_s, study.gaps_m) == (("hertz",), (2e-5,), (45e-6,))
 
 
-def test_values_that_a_study_does_not_vary_come_from_its_specimen():
+def test_values_that_are_not_varied_in_a_study_come_from_its_specimen():
     own = {"model": "asymmetric", "dampings_ns_per_m": [0.5, 0.01, 0.3], "contact": "rigid:0.7"}
     study = Study(**LEAST, specimen=own)
     scene = study.scene((0,) * 6, Rest())
@@ -57,12 +57,6 @@ def test_the_grid_has_a_point_for_every_combination():
     assert study.starts == (Start.REST, Start.UP)
 
 
-def test_differences_of_two_studies_name_the_changed_fields():
-    one, other = Study(**LEAST), Study(**{**LEAST, "amplitudes_m": [2e-6]}, accuracy="quick")
-    assert one.differences(one) == ()
-    assert one.differences(other) == ("amplitudes_m", "accuracy")
-
-
 @pytest.mark.parametrize(
     ("key", "value", "said"),
     [
@@ -79,7 +73,7 @@ def test_differences_of_two_studies_name_the_changed_fields():
         ("gaps_m", [0.0], "greater than 0"),
         ("duration_s", "forever", "duration_s"),
         ("observe", ["spectrum"], "response"),
-        ("duration_s", 1e300, "it must be 1e\\+12 drive periods at most, 1e\\+10 s"),
+        ("duration_s", 1e300, "it must be at most 1e\\+12 drive periods, 1e\\+10 s"),
         ("amplitudes_m", [1e-6, 1e30], r"Drive amplitude 1e\+30 m is not allowed"),
         ("frequencies_hz", [100.0, 1e13], "Drive frequency 10000000000000.0 Hz is not allowed"),
         ("window_s", 0.005, "it must contain one drive period, 0.01 s"),

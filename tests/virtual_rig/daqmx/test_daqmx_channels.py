@@ -24,7 +24,7 @@ def task(daq):
     return daq.task()
 
 
-def test_excitation_is_off_by_default_and_turning_it_on_sets_ac_coupling(task, daq):
+def test_sensor_excitation_is_off_by_default_and_turning_it_on_sets_ac_coupling(task, daq):
     channel = task.ai_channels.add_ai_voltage_chan(MODULE)
     assert channel.ai_coupling is Coupling.DC
     assert channel.ai_excit_src is ExcitationSource.NONE
@@ -125,7 +125,7 @@ def test_a_setting_made_on_a_list_of_channels_reaches_every_channel(task):
     assert [task.ai_channels[name].ai_coupling for name in task.channel_names] == [Coupling.AC] * 2
 
 
-def test_overloads_can_only_be_read_while_the_task_is_running(task, daq):
+def test_overloads_can_be_read_only_while_the_task_is_running(task, daq):
     daq.world.gain = 6.0  # 12 V on ai1
     task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-10, max_val=10)
     task.timing.cfg_samp_clk_timing(25600, sample_mode=AcquisitionType.CONTINUOUS)

@@ -33,7 +33,7 @@ def test_every_device_is_listed_with_its_properties(system):
     assert system.devices["Dev1/ao0"].ao_voltage_rngs == [-3.5, 3.5], "by the name of what is on it"
 
 
-def test_requests_for_missing_features_of_a_device_are_refused_by_name(system):
+def test_the_error_for_a_missing_feature_of_a_device_names_the_feature(system):
     with daq_error(DAQmxErrors.ATTR_NOT_SUPPORTED, r"(?s)analogue output.*cDAQ1Mod1"):
         _ = system.devices["cDAQ1Mod1"].ao_voltage_rngs
     with pytest.raises(DaqError, match=r"Device\.PCI_BUS_NUM"):

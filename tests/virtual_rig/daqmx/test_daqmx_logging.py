@@ -31,7 +31,7 @@ def read_log(path, group="shaken"):
         return {channel.name: (channel[:], dict(channel.properties)) for channel in file[group].channels()}
 
 
-def test_the_log_file_contains_samples_units_interval_and_start(task, tmp_path):
+def test_the_log_file_contains_the_samples_the_units_the_interval_and_the_start(task, tmp_path):
     logging(task, tmp_path / "read.tdms")
     task.start()
     before = datetime.now(UTC)
@@ -46,7 +46,7 @@ def test_the_log_file_contains_samples_units_interval_and_start(task, tmp_path):
         assert abs((began - before).total_seconds()) < 60
 
 
-def test_log_files_are_replaced_and_other_modes_refused(task, tmp_path):
+def test_log_files_are_replaced_and_other_logging_modes_are_refused(task, tmp_path):
     path = tmp_path / "some.tdms"
     for samples in (100, 64):
         logging(task, path)

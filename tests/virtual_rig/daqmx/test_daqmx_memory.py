@@ -41,7 +41,7 @@ class NoTiming:
     value = 0
 
 
-def test_unread_samples_are_lost_when_memory_is_full(daq, task, monkeypatch):
+def test_unread_samples_are_lost_when_the_memory_is_full(daq, task, monkeypatch):
     monkeypatch.setattr(streams, "MOST_SAMPLES", 50_000)
     task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS)
     task.start()

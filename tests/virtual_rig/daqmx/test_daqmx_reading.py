@@ -50,7 +50,7 @@ def test_samples_are_read_in_the_requested_layout(task, daq):
     np.testing.assert_allclose(by_scan.T, closed_form((1, 2, 3), 10, 10), atol=1e-9)
 
 
-def test_a_finite_task_gives_its_samples_and_no_more(daq):
+def test_a_finite_task_gives_exactly_the_requested_number_of_samples(daq):
     task = daq.inputs("Dev1/ai1", RATE_HZ, samples=200)
     task.start()
     task.wait_until_done()
@@ -101,7 +101,7 @@ def test_a_delta_sigma_device_without_timing_samples_at_its_lowest_rate(daq):
     assert task.read() == pytest.approx(0.5)
 
 
-def test_raw_counts_scale_back_to_volts(daq):
+def test_raw_counts_can_be_converted_back_to_volts(daq):
     task = daq.task()
     channel = task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai1")
     task.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)

@@ -51,7 +51,7 @@ def test_a_running_task_cannot_be_changed(task):
             change()
 
 
-def test_a_second_task_of_the_same_name_is_refused(daq, task):
+def test_a_second_task_with_the_same_name_is_refused(daq, task):
     with daq_error(DAQmxErrors.DUPLICATE_TASK):
         Task("measure", grpc_options=daq.options)
 
@@ -112,7 +112,7 @@ def test_a_simulation_that_cannot_start_leaves_the_device_free(daq):
     rival.start()
 
 
-def test_an_unknown_attribute_is_refused_by_name_or_number(daq, task):
+def test_the_refusal_of_an_unknown_attribute_gives_its_name_or_number(daq, task):
     channel = task.ai_channels.all
     with daq_error(DAQmxErrors.ATTR_NOT_SUPPORTED, r"Channel\.AI_LOWPASS_CUTOFF_FREQ"):
         _ = channel.ai_lowpass_cutoff_freq
@@ -122,7 +122,7 @@ def test_an_unknown_attribute_is_refused_by_name_or_number(daq, task):
         task._interpreter.set_chan_attribute_double(task._handle, "Dev1/ai0", 0x1815, 3.0)  # AI_RNG_HIGH
 
 
-def test_calls_that_are_not_simulated_are_refused_by_name(daq):
+def test_the_refusal_of_a_call_that_is_not_simulated_names_the_call(daq):
     stub = nidaqmx_pb2_grpc.NiDAQmxStub(daq.options.grpc_channel)
     for name, request in [
         ("CreateDIChan", nidaqmx_pb2.CreateDIChanRequest()),

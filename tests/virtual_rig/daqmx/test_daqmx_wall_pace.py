@@ -50,7 +50,7 @@ def test_samples_become_available_only_after_their_time(task, clock):
     assert task.in_stream.avail_samp_per_chan == 250
 
 
-def test_a_timeout_returns_the_samples_so_far(task, clock):
+def test_a_read_that_times_out_returns_the_samples_so_far(task, clock):
     clock.advance(0.1)
     with daq_error(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, kind=DaqReadError) as caught:
         task.read(150, timeout=0.02)

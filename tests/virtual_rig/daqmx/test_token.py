@@ -30,13 +30,13 @@ def bench_on(rig):
     return open_bench(rig, confirm=confirm_simulated, calibration=CalibrationRule.WAIVED)
 
 
-def test_loopback_needs_no_token_but_every_other_address_does():
+def test_loopback_needs_no_token_but_every_other_address_needs_a_token():
     assert token_for("127.0.0.1:31763") is None
     assert token_for("localhost:0") is None
     assert token_for("0.0.0.0:31763") != token_for("192.168.0.7:31763")
 
 
-def test_a_client_without_token_reaches_neither_converter_nor_usb_cable(served_rig):
+def test_a_client_without_a_token_reaches_neither_the_converter_nor_the_usb_cable(served_rig):
     _, address = served_rig
     with (
         grpc.insecure_channel(address) as channel,

@@ -157,7 +157,7 @@ def test_a_shape_with_a_lower_frequency_limit_reduces_the_frequency():
     assert ask(device, "FREQ?") == "1.25E+07"
 
 
-def test_channels_with_locked_frequency_share_one_frequency():
+def test_channels_with_locked_frequencies_share_one_frequency():
     device = generator(b"SOUR1:FREQ 100;:SOUR1:FREQ:CONC ON")
     assert ask(device, "SOUR2:FREQ?") == "1.0E+02"
     device.execute(b"SOUR2:FREQ 333")
@@ -173,7 +173,7 @@ def test_a_reset_selects_a_sine_of_1_mhz_and_1_v_with_the_output_off():
     assert ask(device, "OUTP?;:OUTP2?;:FUNC?;:FREQ?;:VOLT?;:VOLT:OFFS?") == "0;0;SIN;1.0E+06;1.0E+00;0.0E+00"
 
 
-def test_the_event_register_distinguishes_kinds_of_error_and_is_cleared_when_read():
+def test_the_event_register_distinguishes_kinds_of_error_and_is_cleared_when_it_is_read():
     device = generator()
     assert ask(device, "*ESR?") == "128"  # power on
     device.execute(b"NONSENSE")

@@ -1,6 +1,6 @@
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.scpi_message import as_block, block, message_end, units
+from vibench.virtual_rig.generator.scpi_message import as_block, block, units
 
 
 def test_a_message_chain_is_split_into_one_unit_per_command():
@@ -28,16 +28,3 @@ def test_a_binary_block_between_other_units_keeps_its_bytes(data):
     _, upload, query = units(message)
     assert block(upload.parameters[1]) == data
     assert query.header == "VOLT"
-
-
-@given(st.binary(max_size=300), st.binary(max_size=20))
-def test_a_message_ends_at_the_newline_after_its_block(data, after):
-    message = b"DATA EMEM," + as_block(data) + b"\n"
-    assert message_end(message + after) == len(message)
-
-
-@given(st.binary(min_size=1, max_size=300), st.data())
-def test_a_message_does_not_end_before_it_is_complete(data, draw):
-    message = b"DATA EMEM," + as_block(data) + b"\n"
-    cut = draw.draw(st.integers(0, len(message) - 1))
-    assert message_end(message[:cut]) is None

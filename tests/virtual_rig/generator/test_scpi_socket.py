@@ -38,7 +38,7 @@ def test_a_socket_session_answers_queries_and_accepts_settings(instrument):
     assert float(instrument.query("SOUR1:FREQ?")) == 1500
 
 
-def test_a_waveform_full_of_newlines_arrives_whole(instrument):
+def test_a_waveform_full_of_newline_bytes_arrives_complete(instrument):
     codes = np.full(8192, 0x0A0A)  # every byte is a newline
     instrument.write_binary_values("DATA:DATA EMEM,", codes, datatype="H", is_big_endian=True)
     back = instrument.query_binary_values(
@@ -50,7 +50,7 @@ def test_a_waveform_full_of_newlines_arrives_whole(instrument):
 
 def test_a_message_received_byte_by_byte_is_one_message(server):
     with socket.create_connection(("127.0.0.1", server.port), timeout=5) as client:
-        for byte in b"FREQ 7;:FREQ?\n":
+        for byte in b"DATA:DATA EMEM,#14\n\n\n\n;:FREQ 7;:FREQ?\n":
             client.sendall(bytes([byte]))
         assert client.recv(100) == b"7.0E+00\n"
 

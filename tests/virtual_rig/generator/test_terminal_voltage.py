@@ -96,7 +96,7 @@ def flat_rig():
     return rig
 
 
-def test_a_command_acts_at_the_time_it_arrives_even_inside_an_interval():
+def test_a_command_acts_at_the_time_at_which_it_arrives_even_inside_an_interval():
     rig = flat_rig()
     rig.time_s = 2.25 * INTERVAL_S
     rig.send("VOLT:OFFS 3.001")
@@ -145,7 +145,7 @@ def test_rendered_samples_do_not_depend_on_the_block_size(mode):
 
 
 @given(seed=st.integers(0, 2**31), density=st.floats(1e-8, 1e-3))
-def test_the_rms_of_the_terminal_noise_is_that_of_its_density_up_to_nyquist(seed, density):
+def test_the_rms_of_the_terminal_noise_follows_from_its_density_up_to_nyquist(seed, density):
     terminal = Terminal(load_ohm=math.inf, noise_v_per_rt_hz=density, seed=seed)
     noise = Rig("FUNC DC;:OUTP ON", terminal).render(20_000)
     expected = density * math.sqrt(1 / (2 * INTERVAL_S))
@@ -239,7 +239,7 @@ def test_the_mean_of_a_shape_agrees_with_a_midpoint_sum(shape, start, span):
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @given(start=STARTS, first=SPANS, second=SPANS)
-def test_the_means_over_two_adjacent_parts_combine_to_the_mean_over_both(shape, start, first, second):
+def test_the_means_over_two_adjacent_parts_combine_to_the_mean_over_both_parts(shape, start, first, second):
     middle = (start + first) % 1.0
     parts = first * mean(shape, start, first) + second * mean(shape, middle, second)
     assert (first + second) * mean(shape, start, first + second) == pytest.approx(parts, abs=1e-9)

@@ -1,33 +1,30 @@
 """Fault scripts: each fault begins at its rig time, ends after its duration, and has its effect."""
 
-import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.changed import changed
+from tests.small_rig import small_rig
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, open_bench
-from vibench.acquisition.bench.bench import RigPower
+from vibench.acquisition.bench import RigPower
 from vibench.acquisition.campaign import ReconnectingBench
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.recording._disk import meet_trouble
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
-from vibench.virtual_rig.rig.fault_script import DISK_FAULTS, PlayedFault
-from vibench.virtual_rig.world.wiring import Coupling, Input
+from vibench.virtual_rig.rig import DISK_FAULTS, PlayedFault
+from vibench.virtual_rig.world.conversion import Coupling, Input
 
 ROOT = Path(__file__).parents[3]
 NIGHT = ROOT / "hardware_configs" / "faults" / "night.toml"
 STEP_S = 1 / 102_400
-_serials = itertools.count(1)
 
 
 @pytest.fixture
 def rig():
-    rig = load_rig("virtual_rig")
-    resource = f"USB0::0x0699::0x0353::F{next(_serials):04d}::INSTR"
-    return changed(rig, daq={"sample_rate_hz": 5120}, generator={"resource": resource})
+    return small_rig()
 
 
 @pytest.fixture
@@ -73,7 +70,7 @@ class TestScripts:
             (fault("overrun", -1), r"at_s = -1"),
         ],
     )
-    def test_an_unknown_fault_is_refused_by_name(self, tmp_path, text, said):
+    def test_the_refusal_of_an_invalid_fault_names_the_fault(self, tmp_path, text, said):
         path = tmp_path / "faults.toml"
         path.write_text(text, encoding="utf-8")
         with pytest.raises(ConfigurationError, match=rf"faults\.toml.*{said}"):
@@ -86,7 +83,7 @@ class TestScripts:
         assert Path(load_rig(tmp_path / "rig.toml").virtual.faults) == tmp_path / "bad.toml"
 
     def test_a_fault_script_is_refused_for_a_real_rig(self, rig):
-        with pytest.raises(ConfigurationError, match="is a real one"):
+        with pytest.raises(ConfigurationError, match="is a real rig"):
             with_faults(rig.model_copy(update={"virtual": None}), NIGHT)
 
     @pytest.mark.parametrize("name", sorted(DISK_FAULTS))
@@ -121,7 +118,7 @@ class TestTime:
             with pytest.raises(DataLost):
                 read_for(bench, 2.0)
 
-    def test_a_virtual_rig_continues_while_its_bench_is_closed_and_opened(self, scripted):
+    def test_a_virtual_rig_continues_while_its_bench_is_closed_and_opened_again(self, scripted):
         with RigPower(scripted(fault("corrupt_reply", 1.0))) as power:
             for _ in range(3):
                 with open_bench(power.rig, power=power) as bench:
@@ -184,7 +181,7 @@ class TestEffects:
     @pytest.mark.parametrize(
         ("name", "said"), [("pull_usb_cable", "amplifier"), ("hang_generator", "MAY STILL BE ON")]
     )
-    def test_a_lost_generator_is_detected_at_the_next_command_and_returns(self, scripted, name, said):
+    def test_a_lost_generator_is_detected_at_the_next_command_and_can_be_reopened(self, scripted, name, said):
         with ReconnectingBench(scripted(fault(name, 0.2, for_s=1.5))) as kept:
             kept.bench.digitizer.start()
             read_for(kept.bench, 0.3)

@@ -118,7 +118,7 @@ def test_a_wrong_load_that_only_the_panel_can_set_doubles_the_voltage(switch_on)
     assert amplitude(volts[DRIVE]) * RIG.daq.channels[DRIVE].attenuation == pytest.approx(0.2, rel=0.01)
 
 
-def test_a_stuck_output_reports_off_and_stays_on(switch_on):
+def test_a_stuck_output_is_reported_as_off_and_stays_on(switch_on):
     program = switch_on()
     program.play(160, 0.2)
     program.rig.faults.stick_output()
@@ -155,7 +155,7 @@ def test_a_rig_that_is_switched_off_has_no_address():
         ("USB0::0x1234::0x0001::C1::INSTR", "'0x1234' is not in .*; give one of 0x0699, "),
     ],
 )
-def test_a_generator_that_is_not_on_usb_or_unknown_cannot_be_simulated(resource, said):
+def test_a_generator_that_is_unknown_or_not_on_usb_cannot_be_simulated(resource, said):
     generator = RIG.generator.model_copy(update={"resource": resource})
     with pytest.raises(ConfigurationError, match=f"generator.resource = '{resource}': {said}"):
         VirtualRig(RIG.model_copy(update={"generator": generator}))

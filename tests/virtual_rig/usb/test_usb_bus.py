@@ -1,5 +1,6 @@
 """The real pyvisa, pyvisa-py and PyUSB on the virtual USB bus."""
 
+import errno
 import subprocess
 import sys
 import textwrap
@@ -106,7 +107,7 @@ def test_a_reply_later_than_the_timeout_is_a_visa_timeout_and_arrives_afterwards
 def test_a_lost_device_raises_an_error_on_every_call_and_keeps_its_output(plugged, how):
     plugged.instrument.write("OUTP ON")
     if how == "cable":
-        plugged.cable.pull_cable()
+        plugged.cable.fail(errno.ENODEV)
     else:
         unplug(plugged.cable)
     for call in (
@@ -120,8 +121,8 @@ def test_a_lost_device_raises_an_error_on_every_call_and_keeps_its_output(plugge
 
 
 def test_a_reconnected_cable_works_with_the_open_session(plugged):
-    plugged.cable.pull_cable()
-    plugged.cable.plug_cable()
+    plugged.cable.fail(errno.ENODEV)
+    plugged.cable.mend(errno.ENODEV)
     assert plugged.instrument.query("*OPC?").strip() == "1"
 
 
@@ -154,7 +155,7 @@ def test_a_second_session_is_refused_while_the_first_is_open(plugged):
     assert plugged.instrument.query("*OPC?").strip() == "1"
 
 
-def test_pyusb_reads_manufacturer_product_and_serial(plugged):
+def test_pyusb_reads_the_manufacturer_the_product_and_the_serial_number(plugged):
     device = usb.core.find(idVendor=0x0699, idProduct=0x0353)
     assert (device.manufacturer, device.product, device.serial_number) == ("TEKTRONIX", "AFG1022", "C010101")
     assert "Bulk OUT" in str(device) or "bulk" in str(device).lower()

@@ -61,10 +61,10 @@ def test_the_usb_proxy_raises_the_errors_of_a_timeout_and_of_a_stall(proxy):
 
 
 def test_a_pulled_cable_and_a_dead_server_raise_the_error_no_such_device(rig, proxy):
-    rig.cable.pull_cable()
+    rig.cable.fail(errno.ENODEV)
     with pytest.raises(OSError, match="No such device") as pulled:
         proxy.bulk_out(bytes(12))
-    rig.cable.plug_cable()
+    rig.cable.mend(errno.ENODEV)
     rig.close()
     with pytest.raises(OSError, match="No such device") as dead:
         proxy.bulk_out(bytes(12))

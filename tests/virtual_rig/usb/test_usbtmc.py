@@ -56,7 +56,7 @@ def test_a_message_may_come_in_pieces_of_any_size(size):
 
 
 @given(st.integers(1, 60))
-def test_a_reply_may_be_fetched_in_pieces_and_only_the_last_ends_the_message(size):
+def test_a_reply_may_be_fetched_in_pieces_and_only_the_last_piece_ends_the_message(size):
     host = Host()
     identity = host.ask(b"*IDN?")
     host.write(b"*IDN?")
@@ -68,7 +68,7 @@ def test_a_reply_may_be_fetched_in_pieces_and_only_the_last_ends_the_message(siz
 
 
 @given(st.integers(12, 64))
-def test_a_transfer_larger_than_the_hosts_buffer_continues_in_the_next_read(buffer):
+def test_a_transfer_larger_than_the_buffer_of_the_host_continues_in_the_next_read(buffer):
     host = Host()
     identity = host.ask(b"*IDN?")
     host.write(b"*IDN?")
@@ -117,7 +117,7 @@ def test_aborting_a_read_that_was_not_started_is_refused():
     assert Host().control(3, value=9, length=2)[0] == 0x81
 
 
-def test_capabilities_state_488_2_without_remote_control_or_trigger():
+def test_the_capabilities_state_488_2_without_remote_control_or_trigger():
     answer = Host().control(7, length=0x18)
     assert len(answer) == 0x18
     assert answer[0] == 1

@@ -18,7 +18,7 @@ def response(running, frequency_hz):
     "analogue",
     [low_pass_poles(50e3), low_pass_poles(10e3), low_pass_poles(None, 30e3), low_pass_poles(None, 8e3, 0.3)],
 )
-def test_the_running_filter_has_the_gain_and_the_phase_of_the_analogue_one(analogue):
+def test_the_running_filter_has_the_gain_and_the_phase_of_the_analogue_filter(analogue):
     running = running_filter(analogue, STEP_S)
     slow, audible = np.array([1.0, 95.0, 266.0, 500.0, 1000.0]), np.array([2e3, 5e3, 10e3])
     for frequency_hz, tolerance in ((slow, 1e-4), (audible, 2e-3)):

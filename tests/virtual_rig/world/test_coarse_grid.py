@@ -41,7 +41,7 @@ def phasors(frequency_hz, amplitude_v, grid):
 
 
 @pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0, WATCHED_HZ])
-def test_the_errors_of_base_and_specimen_on_the_coarsest_grid_are_as_stated(frequency_hz):
+def test_the_errors_of_the_base_and_the_specimen_on_the_coarsest_grid_are_as_stated(frequency_hz):
     coarse, fine = (phasors(frequency_hz, 5e-3, TimeGrid(rate_hz)) for rate_hz in (COARSE.rate_hz, 409_600.0))
     # Near 266 Hz the reaction force of the specimen at resonance adds to the error.
     allowed = max(level_error(frequency_hz, COARSE.rate_hz), 6e-3)
@@ -73,7 +73,7 @@ def test_impacts_are_resolved_inside_a_coarse_step():
 
 
 @pytest.mark.parametrize("rate_hz", [6400.0, 12_799.0, 204_800.0])
-def test_a_time_grid_whose_error_is_too_large_is_refused_and_the_error_stated(rate_hz):
+def test_a_time_grid_whose_error_is_too_large_is_refused_and_the_error_is_stated(rate_hz):
     with pytest.raises(
         ConfigurationError, match=r"grid_rate_hz = .*12800 to 102400 steps.*0\.8% too small at 500 Hz"
     ):

@@ -32,7 +32,7 @@ def decimated_sine(ratio, delay_steps, cycles_per_sample, count=300):
         for column, delay_steps in enumerate((EARLIEST_STEPS, 0.0, 0.37, 5.5))
     ],
 )
-def test_a_sine_in_the_pass_band_keeps_amplitude_and_phase(ratio, delay_steps, cycles_per_sample):
+def test_a_sine_in_the_pass_band_keeps_its_amplitude_and_its_phase(ratio, delay_steps, cycles_per_sample):
     samples, expected = decimated_sine(ratio, delay_steps, cycles_per_sample)
     tolerance = 1e-4 if cycles_per_sample / ratio < 0.23 else 5e-2  # the droop is corrected up to here
     assert np.max(np.abs(samples - expected)) < tolerance
@@ -54,7 +54,7 @@ def test_decimation_keeps_a_constant_unchanged(ratio):
 
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("delay_steps", [EARLIEST_STEPS, 0.0, 300.0])
-def test_decimated_samples_use_no_future_input_and_miss_none(ratio, delay_steps):
+def test_decimated_samples_use_all_past_input_and_no_future_input(ratio, delay_steps):
     filtered = Decimator(ratio, 1000, delay_steps)
     assert filtered.first_step(0) >= 1000 - history_steps(ratio, delay_steps)
     for sample in range(50):

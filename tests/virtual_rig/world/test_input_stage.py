@@ -3,10 +3,19 @@
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.world.conversion import AC_CUT_HZ, OVER_RANGE, InputStage
+from vibench.virtual_rig.world.conversion import (
+    AC_CUT_HZ,
+    OPEN_INPUT,
+    OVER_RANGE,
+    Behind,
+    Cable,
+    Coupling,
+    Input,
+    InputStage,
+    Signal,
+)
 from vibench.virtual_rig.world.sensors import IEPE_BIAS_V
 from vibench.virtual_rig.world.time_grid import USUAL_GRID
-from vibench.virtual_rig.world.wiring import OPEN_INPUT, Behind, Cable, Coupling, Input, Signal
 
 SENSOR = Cable(Behind.IEPE_SENSOR, Signal.BASE_ACCELERATION)
 SOURCE = Cable(Behind.VOLTAGE_SOURCE, Signal.DRIVE)
@@ -33,7 +42,7 @@ SINE = 0.5 * np.sin(2 * np.pi * 400 * STEP_S * np.arange(20_480))
         pytest.param((Coupling.DC, 0.002, 12.0), IEPE_BIAS_V + SINE, False, id="12 V: bias and signal"),
     ],
 )
-def test_an_iepe_sensor_shows_signal_and_bias_only_with_excitation(configured, expected, overloads):
+def test_an_iepe_sensor_shows_its_signal_and_its_bias_only_with_excitation(configured, expected, overloads):
     volts, clips = stage(SENSOR, *configured).pass_on(signals(SINE))
     assert np.max(np.abs(volts - expected)) < (0.01 if Coupling.AC in configured else 1e-9)
     assert clips is overloads

@@ -35,7 +35,7 @@ def noise(amplitude_vpp, realisation):
 
 
 @pytest.mark.parametrize("quantity", [BaseQuantity.FORCE, BaseQuantity.CURRENT, BaseQuantity.STROKE])
-def test_the_strongest_sine_from_fifty_hertz_up_stays_within_the_limits_of_the_shaker(quantity):
+def test_the_strongest_sine_at_fifty_hertz_and_above_stays_within_the_limits_of_the_shaker(quantity):
     limits = RIG.shaker.limits
     allowed = {
         BaseQuantity.FORCE: limits.force_n.value,
@@ -46,7 +46,7 @@ def test_the_strongest_sine_from_fifty_hertz_up_stays_within_the_limits_of_the_s
     assert np.max(reached) < 0.95 * allowed
 
 
-def test_weak_noise_causes_no_impact_and_strong_noise_hundreds():
+def test_weak_noise_causes_no_impact_and_strong_noise_causes_hundreds_of_impacts():
     weak, strong = new_plant(), new_plant()
     truth = motion_of(weak, noise(WEAK_VPP, 1)).ends
     motion_of(strong, noise(STRONG_VPP, 1))

@@ -11,9 +11,8 @@ from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.sim import base_transmissibility
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS
-from vibench.virtual_rig.world.conversion import GROUP_DELAY_SAMPLES, volts_per_count
+from vibench.virtual_rig.world.conversion import GROUP_DELAY_SAMPLES, Coupling, Input, volts_per_count
 from vibench.virtual_rig.world.time_grid import USUAL_GRID, relative_clock_ppm
-from vibench.virtual_rig.world.wiring import Coupling, Input
 from vibench.virtual_rig.world.world import World
 
 GRID_RATE_HZ, STEP_S = USUAL_GRID.rate_hz, USUAL_GRID.step_s
@@ -66,7 +65,7 @@ def phasor(volts, frequency_hz, sample_rate_hz, first_sample=0):
 
 
 @pytest.mark.parametrize("frequency_hz", [60.0, 201.0, 266.0, 480.0])
-def test_every_channel_matches_the_model_of_rig_and_specimen(frequency_hz):
+def test_every_channel_matches_the_model_of_the_rig_and_the_specimen(frequency_hz):
     world, amplitude_v = World(QUIET, Tone(frequency_hz, 5e-3)), 5e-3
     sampler = world.sample(INPUTS, 51_200.0)
     settle = 150_000
@@ -227,7 +226,7 @@ def test_a_rig_of_real_instruments_is_not_simulated():
         World(RIG.model_copy(update={"virtual": None}), Silence())
 
 
-def test_threads_sharing_a_simulated_rig_read_the_same_samples():
+def test_threads_that_share_a_simulated_rig_read_the_same_samples():
     alone = World(RIG, Tone(260.0, 1.0)).sample(INPUTS, 51_200.0).read(6000)
     world = World(RIG, Tone(260.0, 1.0))
     samplers = [world.sample(INPUTS, 51_200.0) for _ in range(2)]
@@ -258,7 +257,7 @@ def test_a_failed_simulation_is_reported_and_stops_the_rig():
     assert np.all(np.isfinite(conversion.read(20000)))
     for _ in range(2):
         with pytest.raises(
-            AcquisitionError, match=r"motion was lost.*The virtual rig has stopped: restart it"
+            AcquisitionError, match=r"motion was lost.*The virtual rig has stopped: restart the rig"
         ):
             conversion.read(51200)
     assert world.time_s < 0.6

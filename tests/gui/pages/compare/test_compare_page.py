@@ -62,14 +62,14 @@ def texts(table):
     ]
 
 
-def test_curves_are_drawn_without_changing_their_values(overlaid):
+def test_curves_are_drawn_with_unchanged_values(overlaid):
     lines = [each.getOriginalDataset() for each in overlaid.plots.magnitudes.getPlotItem().listDataItems()]
     assert any(np.array_equal(y, mode("one").magnitude) for _, y in lines)
     assert any(np.array_equal(y, mode("half", 0.5, 100.0, 500.0).magnitude) for _, y in lines)
     assert overlaid.is_done
 
 
-def test_the_table_lists_peaks_with_damping(overlaid):
+def test_the_table_lists_peaks_with_their_damping(overlaid):
     first, second = texts(overlaid.peaks)
     assert first[0] == "one, Response I, predicted"
     assert float(first[1]) == pytest.approx(266.0, abs=0.2)
@@ -123,7 +123,7 @@ def test_invalid_options_are_refused_with_an_explanation(page):
 
 
 @pytest.mark.thorough
-def test_recordings_are_analysed_in_another_process_overlaid_and_exported(
+def test_recordings_are_analysed_in_another_process_and_overlaid_and_exported(
     working, record_noise, tmp_path, wait_for
 ):
     """The whole use of the page: two recordings, curves, a picture with a known point, a report."""
@@ -166,7 +166,7 @@ def test_a_copy_under_another_name_is_shown_once(page, record_noise, tmp_path):
 
 
 @pytest.mark.thorough
-def test_failed_analyses_and_exports_are_reported_and_keep_the_other_curves(working, tmp_path, wait_for):
+def test_failed_analyses_and_exports_are_reported_and_the_other_curves_are_kept(working, tmp_path, wait_for):
     notices = []
     working.context.noticed.connect(notices.append)
     working.add_prediction((mode("model"),))

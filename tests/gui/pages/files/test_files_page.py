@@ -11,8 +11,7 @@ from PySide6.QtWidgets import QFileDialog, QInputDialog
 
 from vibench.acquisition import load_toml, shipped
 from vibench.acquisition.campaign import JournalPointState, ReasonCode
-from vibench.acquisition.campaign._bench_identity import BenchIdentity
-from vibench.acquisition.campaign._journal import Journal, journal_path
+from vibench.acquisition.campaign._journal import BenchIdentity, Journal, journal_path
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
 from vibench.acquisition.recording import RecordingState, open_recording
 from vibench.acquisition.rig import Rig
@@ -81,7 +80,7 @@ def page(shared_page, folder, wait_for):
     if (shared_page.context.folder, shared_page._folder) != (folder, folder):
         shared_page.context.choose_folder(folder)
     wait_for(lambda: not shared_page.context.background.is_busy)
-    shared_page.table.search("")
+    shared_page.table.shown_rows.setFilterFixedString("")
     return shared_page
 
 
@@ -111,7 +110,7 @@ def curve_data(page, number):
 
 
 @pytest.mark.thorough
-def test_the_list_describes_state_plan_and_problems_of_every_file(page):
+def test_the_list_describes_the_state_the_plan_and_the_problems_of_every_file(page):
     assert cell(page, "whole", "State") == "✔ complete"
     assert cell(page, "stopped", "State") == "■ stopped"
     assert cell(page, "broken", "State") == "✖ unreadable"
@@ -184,7 +183,7 @@ def test_an_impact_of_three_samples_is_visible_at_every_zoom(show_file):
         assert len(time_s) <= 2.1 * page.time_histories.width()
 
 
-def test_a_recording_without_overview_can_be_opened(show_file):
+def test_a_recording_without_an_overview_can_be_opened(show_file):
     page = show_file("old.h5")
     assert np.nanmax(curve_data(page, 2)[1]) == pytest.approx(0.4, rel=1e-5)
 
@@ -229,10 +228,10 @@ def test_markers_measure_time_differences(show_file):
     assert "0.5 s apart = 1 / 2 Hz" in page._view.text()
 
 
-def test_search_keeps_rows_containing_all_words(page):
-    page.table.search("95 hz")
+def test_the_search_keeps_the_rows_that_contain_all_words(page):
+    page.table.shown_rows.setFilterFixedString("95 hz")
     assert page.table.model().rowCount() == 1
-    page.table.search("")
+    page.table.shown_rows.setFilterFixedString("")
     assert page.table.model().rowCount() == 4
 
 
@@ -264,7 +263,7 @@ def test_a_recording_from_another_folder_can_be_opened(page, record, tmp_path, q
 
 
 @pytest.mark.thorough
-def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(show_file, wait_for):
+def test_the_spectrogram_of_the_visible_range_shows_the_drive_and_the_impact(show_file, wait_for):
     page = show_file("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)
@@ -288,7 +287,7 @@ def test_the_spectrogram_of_the_visible_range_shows_drive_and_impact(show_file, 
     page.pictures.setCurrentWidget(page.time_histories)
 
 
-def test_opening_a_recording_by_its_path_reads_it_once(show_file, folder, wait_for, monkeypatch):
+def test_opening_a_recording_by_its_path_reads_the_file_once(show_file, folder, wait_for, monkeypatch):
     page, read = show_file("stopped.h5"), []
 
     def counted(path):
@@ -338,7 +337,7 @@ def test_a_file_list_that_arrives_late_keeps_the_current_selection(page, shared_
     assert page.table.chosen_paths() == chosen
 
 
-def test_browsing_a_folder_does_not_change_where_recordings_are_saved(page, folder, tmp_path, wait_for):
+def test_browsing_a_folder_does_not_change_the_folder_for_new_recordings(page, folder, tmp_path, wait_for):
     listed = page.table.recordings
     assert listed.entries
     page._folder_line.setText(str(tmp_path))
@@ -385,7 +384,7 @@ def test_the_text_of_a_forged_note_is_not_shown(record, tmp_path):
         said = facts_text(recording, whole_check(path))
     assert "glue was dry" not in said
     assert "note: ✖ " in said
-    assert "results changed since they were saved: note" in said
+    assert "results that were changed after they had been saved: note" in said
 
 
 def test_the_summary_of_a_recording_shows_its_state_once(begin_recording, tmp_path):
@@ -395,7 +394,7 @@ def test_the_summary_of_a_recording_shows_its_state_once(begin_recording, tmp_pa
         assert facts_text(recording, None).startswith("■ stopped by the operator, in the window")
 
 
-def test_a_growing_file_shows_the_size_of_its_data_without_free_space(begin_recording, tmp_path, wait_for):
+def test_a_growing_file_shows_the_size_of_its_data_without_unused_space(begin_recording, tmp_path, wait_for):
     """A long run was shown as 512 MB one second after its start."""
     writer, part = begin_recording(tmp_path, "grows")
     wait_for(lambda: writer.committed_samples == 6400)
@@ -425,7 +424,7 @@ def test_no_hint_asks_for_a_recording_when_a_recording_is_selected(
 
 
 @pytest.mark.thorough
-def test_the_wheel_zooms_the_spectrogram_and_the_cursor_reads_its_level(show_file, wait_for, qtbot):
+def test_the_wheel_zooms_the_spectrogram_and_the_cursor_shows_the_level(show_file, wait_for, qtbot):
     page = show_file("whole.h5")
     view = page.pictures.spectrogram
     page.pictures.setCurrentWidget(view)

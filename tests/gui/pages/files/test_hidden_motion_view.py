@@ -48,7 +48,7 @@ def test_hidden_motion_is_drawn_between_the_mechanical_stops(pictures, shaken_re
 
 @pytest.mark.thorough
 def test_choosing_another_specimen_identifies_the_gaps_again(pictures, wait_for, tmp_path, monkeypatch):
-    """With gaps 1 um too small the track is lost; collisions then identify the gaps."""
+    """With gaps 1 um too small, the track is lost; collisions then identify the gaps."""
     described = tmp_path / "tight.toml"
     described.write_text('name = "tight"\nabout = "1 um less"\nmodel = "gong2025"\ngap_m = 44e-6\n')
     monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(described), ""))

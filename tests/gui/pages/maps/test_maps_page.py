@@ -8,7 +8,7 @@ from PySide6.QtTest import QTest
 from tests.gui.geometry import wrongly_enabled
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
 from vibench.analysis.prediction.progress import MapRequest
-from vibench.gui.pages.maps.maps_page import MapsPage
+from vibench.gui.pages.maps import MapsPage
 from vibench.gui.widgets.notice import SIMULATE
 from vibench.sim import gong2025
 
@@ -70,7 +70,7 @@ def test_the_visible_part_of_a_map_can_be_refined(page, wait_for):
 
 
 @pytest.mark.thorough
-def test_clicking_a_point_of_a_map_shows_its_motion_and_opens_it_on_the_simulate_page(page, wait_for):
+def test_clicking_a_point_of_a_map_shows_the_motion_and_opens_the_point_on_the_simulate_page(page, wait_for):
     compute_map(page, wait_for)
     wanted, pages = [], []
     page.context.scene_requested.connect(lambda *point: wanted.append(point))
@@ -113,7 +113,7 @@ def test_a_map_that_is_too_large_is_refused_with_an_explanation(page):
 
 
 @pytest.mark.thorough
-def test_map_and_motion_of_another_specimen_are_greyed_out(page, wait_for):
+def test_the_map_and_the_motion_of_another_specimen_are_greyed_out(page, wait_for):
     compute_map(page, wait_for)
     page.pick(120.0, 1e-5)
     wait_for(lambda: page.displayed_results[1].inputs is not None and page.motion.isEnabled(), 100.0)

@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import Finding, Verdict
-from vibench.gui.pages.rig.rig_page import expected_text, finding_name, measured_text
+from vibench.gui.pages.rig import expected_text, finding_name, measured_text
 
 
 def finding(number, unit, value="as the check says", uncertainty=None, advice=""):
@@ -36,7 +36,7 @@ def test_small_and_large_values_of_findings_are_shown_with_unit_prefixes(number,
     assert measured_text(finding(number, unit)) == text
 
 
-def test_value_and_uncertainty_of_a_finding_share_one_unit_prefix():
+def test_the_value_and_the_uncertainty_of_a_finding_share_one_unit_prefix():
     assert measured_text(finding(1.2e-3, "V", uncertainty=4e-5)) == "1.2 ± 0.04 mV"
 
 

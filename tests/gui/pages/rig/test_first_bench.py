@@ -4,7 +4,7 @@ import pytest
 
 from vibench.acquisition import shipped
 from vibench.gui.page.app_context import AppContext, SettingKey, Settings
-from vibench.gui.pages.rig.rig_page import RigPage
+from vibench.gui.pages.rig import RigPage
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from vibench.acquisition.rig import load_rig
-from vibench.gui.pages.rig.rig_page import KnobSheetForm
+from vibench.gui.pages.rig import KnobSheetForm
 
 CONFIGS = Path(__file__).resolve().parents[4] / "hardware_configs"
 

@@ -26,12 +26,13 @@ def armed_status(campaign, lines):
 
 
 @pytest.fixture
-def small(window, qapp, qtbot):
+def small(lasting_window, qapp, qtbot):
     """The Run page of a small window with a large font; the armed plan does not fit."""
     font = QFont(qapp.font())
     large = QFont(font)
     large.setPointSize(14)
     qapp.setFont(large)
+    window = lasting_window
     window._timer.stop()
     window.resize(1024, 700)
     window.show_page(RUN)
@@ -49,7 +50,7 @@ def show(page, status, qapp):
 
 
 @pytest.mark.thorough
-def test_start_is_enabled_only_after_the_plan_was_scrolled_to_its_end(small, qapp, qtbot):
+def test_the_start_button_is_enabled_only_after_the_plan_was_scrolled_to_its_end(small, qapp, qtbot):
     page, status = small
     show(page, status, qapp)
     card, bar = page.arm_card, page._parts.side.verticalScrollBar()
@@ -88,7 +89,8 @@ def test_a_new_armed_plan_is_shown_from_its_beginning(small, qapp):
 
 
 @pytest.mark.thorough
-def test_a_plan_that_fits_into_the_window_can_be_started_at_once(window, qapp):
+def test_a_plan_that_fits_into_the_window_can_be_started_at_once(lasting_window, qapp):
+    window = lasting_window
     window._timer.stop()
     window.resize(1280, 800)
     window.show_page(RUN)

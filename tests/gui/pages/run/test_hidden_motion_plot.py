@@ -91,7 +91,7 @@ def test_the_plot_of_hidden_motion_is_empty_without_a_twin(picture):
     assert picture.caption.text() == "The live twin is off."
 
 
-def test_the_twin_switch_shows_and_changes_its_state(context, qtbot):
+def test_the_twin_switch_shows_and_changes_the_state_of_the_twin(context, qtbot):
     card = WatchCard(context.theme)
     card.show_status(status(), 0)
     assert card.twin.isChecked()

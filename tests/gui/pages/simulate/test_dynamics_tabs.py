@@ -54,7 +54,7 @@ def start_request(view, request):
 
 
 @pytest.mark.thorough
-def test_branches_are_drawn_with_error_and_cost(page, wait_for):
+def test_branches_are_drawn_with_their_error_and_their_cost(page, wait_for):
     view = page.branches
     start_request(view, BranchRequest(start=60.0, stop=62.0, places=2, starts=0))
     assert view.simulator.is_busy
@@ -68,7 +68,7 @@ def test_branches_are_drawn_with_error_and_cost(page, wait_for):
 
 
 @pytest.mark.parametrize("along", list(Parameter))
-def test_stable_branches_are_solid_and_unstable_branches_dashed(page, along):
+def test_stable_branches_are_solid_and_unstable_branches_are_dashed(page, along):
     view = page.branches
     start = 1e-6 if along is Parameter.AMPLITUDE else 100.0
     start_request(view, BranchRequest(along=along, start=start, stop=110.0, places=2, starts=0))
@@ -121,7 +121,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
 
 @pytest.mark.thorough
 @pytest.mark.timeout(300)
-def test_a_chain_is_simulated_and_drawn_over_frequency_cells_and_time(page, wait_for):
+def test_a_chain_is_simulated_and_drawn_over_frequency_and_cells_and_time(page, wait_for):
     view = page.chain
     start_request(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
     wait_for(lambda: not view.simulator.is_busy, 280.0)

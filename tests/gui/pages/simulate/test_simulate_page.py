@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from tests.gui.geometry import wrongly_enabled
-from vibench.analysis.prediction.accuracy_cost import MEASURED
-from vibench.analysis.prediction.progress import SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+from vibench.analysis.prediction.progress import (
+    MEASURED,
+    SimulatedPoint,
+    SimulatedSignal,
+    SimulationRequest,
+    Trouble,
+)
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.sim import Accuracy, Ensemble, FoundMotion, MotionKind, Share, StartMemory
 
@@ -90,7 +95,7 @@ def test_invalid_inputs_cannot_be_simulated(page):
     assert page._begin.isEnabled()
 
 
-def test_cost_and_error_are_shown_beside_the_accuracy(page):
+def test_the_cost_and_the_error_are_shown_beside_the_accuracy(page):
     page.form.show_value(SimulationRequest(accuracy="quick"))
     quick = page._cost.text()
     page.form.show_value(SimulationRequest(accuracy="reference"))
@@ -101,7 +106,7 @@ def test_cost_and_error_are_shown_beside_the_accuracy(page):
     assert quick != strict
 
 
-def test_exponents_similarity_impacts_and_motion_are_drawn_while_computed(page):
+def test_exponents_and_similarity_and_impacts_and_motion_are_drawn_while_they_are_computed(page):
     simulate(page, step_hz=100.0)
     page.simulator.cancel()
     page._grow(

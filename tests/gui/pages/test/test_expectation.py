@@ -3,7 +3,7 @@
 import pytest
 
 from tests.gui.geometry import wrongly_enabled
-from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.excitation.plan import BaseLevel
 from vibench.acquisition.plan import Dwell, Measurement, Until
 from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.test import test_preview as preview
@@ -28,7 +28,7 @@ def test_the_expected_uncertainty_is_shown_below_the_prediction(page):
     assert page.expectation.text() == ""
 
 
-def test_a_test_with_an_until_bound_shows_its_predicted_time(page):
+def test_a_test_with_the_key_until_shows_its_predicted_time(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=60)
     test = Measurement(name="weak", excitation=plan, until=Until(response_ii=0.01))
     page._on_result(preview.predict_test(preview.TestPreview(test, RIG)))
