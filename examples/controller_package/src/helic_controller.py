@@ -164,7 +164,7 @@ class HelicController:
                     self._close_gate()
             finally:
                 self._error = self._error or InstrumentError(
-                    f"the connection to the board at {self._link.where} was closed. The board is silent; "
+                    f"the connection to the board at {self._link.where} was closed. Its output is off; "
                     "open the bench again"
                 )
                 self._leaving.set()
@@ -235,7 +235,7 @@ class HelicController:
             lambda: self._error is not None or ticks - self._ticks - self._following <= late, PATIENCE_S
         ):
             raise InstrumentError(
-                f"the board at {self._link.where} answers, but its samples no longer arrive. It was "
+                f"the board at {self._link.where} answers, but its samples no longer arrive. The board was "
                 "silenced; let the UDP datagrams of its stream pass the firewall, and check the network"
             )
         self._require_there()
@@ -330,7 +330,7 @@ def check_board(link: HelicLink, config: ControllerConfig) -> tuple[str, ...]:
     if config.pd_of is not LoopInput.M0 or abs(link.rate_hz / config.rate_hz - 1) > 0.01:
         raise ConfigurationError(
             f"the board at {link.where} takes {link.rate_hz:g} samples a second and only laws of m0's "
-            f"velocity; the configuration has {config.rate_hz:g} and pd_of = {config.pd_of or 'nothing'}. "
+            f"velocity; the configuration has {config.rate_hz:g} Hz, pd_of = {config.pd_of or 'nothing'}. "
             'Nothing was played; make them agree (pd_of = "m0_velocity")'
         )
     link.set("arm", 0)
@@ -350,6 +350,6 @@ def open_gate(link: HelicLink) -> None:
         link.set("arm", 0)
         why = "has tripped" if safety & GATE_TRIPPED else "does not open"
         raise InstrumentError(
-            f"the safety gate of the board at {link.where} {why}. The board is silent; check its sensors, or "
+            f"the safety gate of the board at {link.where} {why}. Its output is off; check its sensors, or "
             "build its rig with SAFETY_GATED: without a gate, nothing silences the board if its host is lost"
         )

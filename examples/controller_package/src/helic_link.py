@@ -156,8 +156,8 @@ class HelicLink:
         if kind == Ask.ERROR:
             raise InstrumentError(
                 f"the board at {self.where} refused {what or ask.name.lower()}: "
-                f"{_ERRORS.get(answer[0], f'error {answer[0]}')}. It was silenced; check which values its "
-                "firmware allows"
+                f"{_ERRORS.get(answer[0], f'error {answer[0]}')}. The board was silenced; check which values "
+                "its firmware allows"
             )
         return answer
 

@@ -184,7 +184,7 @@ def charge_amplifier(rig: Rig, config: ChannelConfig) -> SensorFacts:
     try:
         sensor_pc, amplifier_mv = config.options["pc_per_m_per_s2"], config.options["mv_per_pc"]
     except KeyError as missing:
-        raise ConfigurationError(f"options of the channel lack {missing}; add this key") from missing
+        raise ConfigurationError(f"the channel's options do not contain {missing}; add this key") from missing
     return SensorFacts(
         "acceleration",
         "m s-2",
