@@ -165,6 +165,11 @@ def test_cards_drawn_in_advance_give_the_same_report(dwell_file, tmp_path):
     marked = {each: replace(card, result="taken from the card") for each, card in drawn.items()}
     path = write_report(results, tmp_path / "marked.html", drawn=marked)
     assert "taken from the card" in path.read_text(encoding="utf-8")
+    figures = [card.figure for card in drawn.values()] + [
+        each for card in drawn.values() for fold in card.folds for each in fold.figures
+    ]
+    assert figures
+    assert not any(hasattr(each, "figure") for each in figures)  # they would take megabytes each
 
 
 def test_a_report_of_one_recording_uses_the_singular(dwell_file, tmp_path):

@@ -187,6 +187,7 @@ class DrawnFigure:
     title: str
     caption: str
     figure: Figure
+    """Curves and texts of the figure; absent after `release`."""
     tables: tuple[Table, ...]
 
     png = cached_property[bytes](lambda self: self._render("png"))
@@ -205,6 +206,13 @@ class DrawnFigure:
                 self.figure.set_layout_engine(None)
             self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)
         return target.getvalue()
+
+    def release(self) -> None:
+        """Draw the images of a report, and free the figure, which takes megabytes; no PDF can follow."""
+        for kind in SCREEN:
+            getattr(self, kind.value)
+        self.figure.clear()
+        del self.__dict__["figure"]
 
     def save(self, folder: Path, kinds: Sequence[ImageKind] = SCREEN) -> tuple[Path, ...]:
         """Write the requested images, and the tables as CSV; replace older files of the same name."""

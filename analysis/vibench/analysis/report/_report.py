@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime, timedelta
-from itertools import islice, product
+from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -20,7 +20,7 @@ from ..errors import NotEnoughData
 from ..figures.dwells import verdict_text
 from ..figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
 from ..figures.maps import branches_figure, map_figure
-from ..figures.style import SCREEN, DrawnFigure
+from ..figures.style import DrawnFigure
 from ..hidden_motion import HiddenMotion
 from ..kinds import ANALYSES, AnyResult, DwellResult, NoiseResult
 from ..recordings.checks import Verdict
@@ -28,7 +28,6 @@ from ..recordings.facts import RecordingFacts, known_specimen
 from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
 from ..sine.stepped_response import SteppedResponse, lost_levels, tracked_resonances
 from ..sine.sweep import SweepResponse
-from ..tables import ImageKind
 from ._drawings import DRAWINGS, figures_together, limits, recording_figures, result_sentence
 from ._page import Agreement, Card, Fold, Page, ReportTable, write_page
 from ._result_tables import nearest_resonance, uncertainty_table
@@ -436,17 +435,18 @@ def _about(results: CampaignResults) -> str:
 
 
 def draw_cards(results: CampaignResults) -> dict[AnyResult, Card]:
-    """Return the card of each result for `write_report`, with images already drawn."""
-    return {each: _card(each, results, SCREEN) for each in results.results}
+    """Return the card of each result for `write_report`, with images drawn and figures freed."""
+    return {each: _card(each, results, is_drawn=True) for each in results.results}
 
 
-def _card(result: AnyResult, results: CampaignResults, kinds: Sequence[ImageKind] = ()) -> Card:
+def _card(result: AnyResult, results: CampaignResults, *, is_drawn: bool = False) -> Card:
     failed = {each.name.removesuffix(".part").removesuffix(".h5"): each for each in results.failures}
     facts, drawing = result.analysis.facts, DRAWINGS[result.kind]
     figure, *more = drawing.figures(result)
     settings = recording_figures(result)
-    for each, kind in product((figure, *more, *settings), kinds):
-        getattr(each, kind.value)
+    if is_drawn:
+        for each in (figure, *more, *settings):
+            each.release()
     agreement, look_at = agreement_of(result, failed.get(facts.name))
     warned = [each for each in result.analysis.checks if each.verdict is Verdict.WARNING]
     checks = tuple((each.verdict.value, each.what, each.text) for each in result.analysis.checks)
