@@ -6,6 +6,8 @@ import subprocess
 import sys
 import time
 from math import factorial
+from pathlib import Path
+from threading import Barrier, Thread
 
 import pytest
 
@@ -157,3 +159,24 @@ def test_a_callback_may_close_its_process_pool(patient_pool):
     assert patient_pool.ask(factorial, errors.append, errors.append, 3).is_over
     patient_pool.poll()
     assert len(errors) == 1
+
+
+def heaps_of_threads(_number):
+    """Return how many parts of memory glibc has reserved as further heaps (64 MB each, mostly unused)."""
+    barrier = Barrier(4)
+    threads = [Thread(target=lambda: (bytearray(10_000), barrier.wait())) for _ in range(4)]
+    for each in threads:
+        each.start()
+    for each in threads:
+        each.join()
+    lines = [each.split() for each in Path("/proc/self/maps").read_text().splitlines()]
+    spans = [[int(end, 16) for end in words[0].split("-")] for words in lines if words[1] == "---p"]
+    return sum(60 << 20 < stop - start < 64 << 20 for start, stop in spans)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only glibc has further heaps")
+def test_all_threads_of_a_background_process_use_one_heap(patient_pool):
+    answers = []
+    patient_pool.ask(heaps_of_threads, answers.append, answers.append, 1)
+    poll_until(patient_pool, lambda: answers)
+    assert answers == [0]

@@ -25,7 +25,7 @@ from vibench.analysis import (
     merge_results,
 )
 from vibench.sim.background import Pool, Progress
-from vibench.sim.operating_system.this import replace_file
+from vibench.sim.operating_system.this import replace_file, use_one_heap
 
 from .analyse import complain_about
 from .measure import the_bench
@@ -87,6 +87,7 @@ def demo(
 ) -> None:
     """Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report."""
     folder = free_path(Path("vibench_demo")) if out is None else out
+    use_one_heap()
     campaign = load_campaign(shipped("campaigns/demo.toml"))
     console.print("The experiment of Gong et al. (2025), section 5, on a virtual rig.")
     console.print()

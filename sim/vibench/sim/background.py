@@ -20,7 +20,7 @@ from threading import Event, Thread
 from time import monotonic
 from typing import Any, ParamSpec, TypeVar
 
-from .operating_system.this import bound_memory, lower_priority
+from .operating_system.this import bound_memory, lower_priority, use_one_heap
 
 NICE = 10
 MOST_BYTES = 6 << 30
@@ -281,6 +281,7 @@ def _serve(connection: Any) -> None:
     with suppress(OSError):
         lower_priority(NICE)
     bound_memory(MOST_BYTES)
+    use_one_heap()
     executor, dropped = ThreadPoolExecutor(1), Event()
     with suppress(EOFError, OSError):
         while True:

@@ -25,6 +25,7 @@ process_start = system.process_start
 read_at = system.read_at
 sync_data = system.sync_data
 sync_folder = system.sync_folder
+use_one_heap = system.use_one_heap
 usual_shared_folder = system.usual_shared_folder
 usual_state_folder = system.usual_state_folder
 write_at = system.write_at

@@ -80,6 +80,10 @@ def lower_priority(by: int) -> None:  # noqa: ARG001 - Windows has priority clas
     kernel.SetPriorityClass(kernel.GetCurrentProcess(), _BELOW_NORMAL)
 
 
+def use_one_heap() -> None:
+    """Do nothing: the threads share a heap already."""
+
+
 def bound_memory(most_bytes: int) -> None:
     """Do nothing: only a job object limits memory, and a process cannot leave a job object."""
 
