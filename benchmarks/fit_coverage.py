@@ -46,7 +46,7 @@ from vibench.analysis.frequency_response.results import (
     converted_frequency_response,
 )
 from vibench.analysis.hidden_motion import Hidden
-from vibench.analysis.signals.quantity import Quantity
+from vibench.analysis.signals import Quantity
 from vibench.sim import Specimen, base_transmissibility, gong2025
 
 Complexes = NDArray[np.complex128]

@@ -47,7 +47,7 @@ from vibench.acquisition.rig import (
     shaker_of,
     specimen_of,
 )
-from vibench.analysis.figures.style import MEASURED, SIMULATED, figure_style, legend_above, new_figure
+from vibench.analysis.report import MEASURED, SIMULATED, figure_style, legend_above, new_figure
 from vibench.sim import Specimen
 from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.branch import Branch

@@ -139,7 +139,7 @@ def main() -> None:
                 analysed = ("analyse", recording, "--out", report)
                 print_path(
                     "recording through analyse",
-                    walk(":analyse", "measurement_analysis.py:analyse", *analysed),
+                    walk(":analyse", "kinds.py:_analyse_sweep", *analysed),
                 )
 
 

@@ -11,7 +11,7 @@ from tests.reading_reports import Page
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState, SegmentLabel
 from vibench.analysis import analyse
-from vibench.analysis.signals.averaging import phase_half_width
+from vibench.analysis.signals import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 LINEAR_HZ = (95.0, 266.0, 500.0)

@@ -1,6 +1,5 @@
 from .chaos.verdict import MotionVerdict as MotionVerdict, Points as Points, motion_verdict as motion_verdict
 from .comparison import (
-    AnalysisOptions as AnalysisOptions,
     Curve as Curve,
     CurveKind as CurveKind,
     CurveOrigin as CurveOrigin,
@@ -46,6 +45,7 @@ from .overlay.similarity import (
 )
 from .results.campaign_results import (
     AnalysisFailure as AnalysisFailure,
+    AnalysisOptions as AnalysisOptions,
     CampaignResults as CampaignResults,
     FailedStep as FailedStep,
     analyse as analyse,
@@ -66,7 +66,7 @@ from .results.compared_recording import (
     recorded_specimen as recorded_specimen,
 )
 from .results.spectral_functions import scan_files as scan_files, spectral_functions as spectral_functions
-from .signals.averaging import Window as Window
+from .signals import Window as Window
 from .uncertainty.expected import (
     ExpectedResult as ExpectedResult,
     TimeShare as TimeShare,

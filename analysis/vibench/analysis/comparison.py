@@ -8,22 +8,16 @@ package also finds peaks, values at markers, and differences of curves.
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated, Self
 
 import numpy as np
 import scipy
-from pydantic import Field, PositiveFloat, model_validator
-
-from vibench.sim import FrozenModel
 
 from .errors import NotEnoughData
 from .frequency_response.noise_response import NoiseResponse
-from .frequency_response.results import Estimator, FrequencyResponseRequest
 from .live import column_starts, envelope
 from .overlay.ensemble import CurveDifference, logarithmic_difference
-from .overlay.overlay import ResponsePrediction, Simulation
-from .signals.arrays import PER_NEPER_DB, Reals
-from .signals.averaging import DEFAULT_CONFIDENCE, Window
+from .overlay.overlay import ResponsePrediction
+from .signals import PER_NEPER_DB, Reals
 from .sine.dwell import DwellResponse
 from .sine.stepped_response import SteppedResponse
 from .sine.sweep import SweptMotion
@@ -344,36 +338,3 @@ def _responses(
     unknown = np.full(frequency_hz.shape, np.nan)
     yield Curve(name, origin, CurveKind.RESPONSE_I, frequency_hz, first, unknown, note)
     yield Curve(name, origin, CurveKind.RESPONSE_II, frequency_hz, second, sd_second / second, note)
-
-
-class AnalysisOptions(FrozenModel):
-    """Options of an analysis; the options from estimator to confidence apply to noise only."""
-
-    model: Simulation = Simulation.LEFT_OUT
-    """Simulation to overlay: rig and specimen driven by the recorded voltage (the twin), or the specimen
-    alone driven by the recorded base motion. A simulation takes seconds to minutes per recording."""
-    estimator: Estimator = Estimator.DRIVE
-    """Estimator: noise on the base biases 'h1', noise on the response biases 'h2', neither biases 'drive'."""
-    noise_ratio: float | None = Field(default=None, ge=0.0)
-    """For hv only: ratio of the noise densities of m0's velocity and the base acceleration, in s²."""
-    window: Window = Window.HANN
-    """Window of the segments of streamed noise."""
-    resolution_hz: PositiveFloat | None = None
-    """Resolution for streamed noise; automatic by default. Give either resolution or averages."""
-    averages: Annotated[float, Field(gt=1.0)] | None = None
-    """Number of independent averages of streamed noise; automatic by default."""
-    overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
-    """Overlap of neighbouring segments, as a fraction of their length."""
-    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
-    """Probability that the bounds at a spectral line contain the true value."""
-
-    @model_validator(mode="after")
-    def _is_allowed(self) -> Self:
-        """Refuse invalid combinations of options: building the noise request raises an error for them."""
-        self.request  # noqa: B018 - making it is the check
-        return self
-
-    @property
-    def request(self) -> FrequencyResponseRequest:
-        """Noise analysis requested by these options."""
-        return FrequencyResponseRequest(**self.model_dump(exclude={"model"}))

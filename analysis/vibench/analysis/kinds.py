@@ -361,7 +361,9 @@ ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
     },
     PlugInKind.ANALYSIS,
 )
-"""Analyses, keyed by the kind of excitation; families are in the order of a report."""
+"""Analyses, keyed by the kind of excitation."""
+FAMILIES = tuple(each.family for each in (REPEATED_NOISE, SWEEP, DWELL, STEPPED_SINE))
+"""Families of analyses in the order of a report; families of other packages follow."""
 
 
 def family_of(plan: Mapping[str, Any]) -> str:

@@ -13,17 +13,20 @@ from numpy.lib.stride_tricks import sliding_window_view
 from scipy import fft
 
 from .errors import InvalidRequest, NotEnoughData, UnusableData
-from .signals.arrays import Complexes, Flags, Reals
-from .signals.averaging import (
+from .signals import (
     DEFAULT_CONFIDENCE,
+    Complexes,
+    Flags,
+    Quantity,
+    Reals,
     Window,
     by_name,
     chi_square_bounds,
+    derivative_factor,
     effective_averages,
     hop_samples,
     taper,
 )
-from .signals.quantity import Quantity, derivative_factor
 from .tables import Tabular
 
 _BATCH_SAMPLES = 1 << 19

@@ -16,9 +16,7 @@ import scipy
 from scipy.special import log_ndtr, ndtr
 
 from .errors import InvalidRequest, UnusableData
-from .signals.arrays import Complexes, Reals
-from .signals.averaging import standard_uncertainty
-from .signals.quantity import derivative_factor
+from .signals import Complexes, Reals, derivative_factor, standard_uncertainty
 from .spectra import AmplitudeSpectrum, SpectralDensity, amplitude_spectrum
 from .tables import Tabular
 

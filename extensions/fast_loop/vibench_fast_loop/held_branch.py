@@ -16,18 +16,18 @@ from vibench.acquisition.recording import (
     FeedbackNote,
     Stability,
 )
-from vibench.analysis.figures.style import (
+from vibench.analysis.recordings.facts import specimen_of
+from vibench.analysis.report import (
     MEASURED,
     SIMULATED,
+    STEPPED,
     DrawnFigure,
     figure_style,
     legend_above,
     new_figure,
     with_prefix,
 )
-from vibench.analysis.recordings.facts import specimen_of
-from vibench.analysis.report import STEPPED
-from vibench.analysis.signals.arrays import Reals
+from vibench.analysis.signals import Reals
 from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
 from vibench.analysis.tables import Tabular, rows, table
 from vibench.sim import Branch, Specimen

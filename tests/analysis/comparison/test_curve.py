@@ -9,8 +9,8 @@ import pytest
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin, NotEnoughData, curve_difference, curve_peaks
 from vibench.analysis.comparison import sorted_curve
-from vibench.analysis.figures.comparison import comparison_figure
 from vibench.analysis.report import ImageKind
+from vibench.analysis.report._comparison import comparison_figure
 
 MODE_HZ, DAMPING = 266.0, 0.01
 

@@ -19,7 +19,7 @@ from vibench.analysis import (
 from vibench.analysis.dynamics import BranchDiagram, BranchRequest, diagram_of, write_diagram
 from vibench.analysis.report import write_report
 from vibench.analysis.report._drawings import limits
-from vibench.analysis.report._report import draw_branches, draw_maps
+from vibench.analysis.report._maps import draw_branches, draw_maps
 from vibench.cli.__main__ import app
 from vibench.sim import gong2025
 from vibench.sim.maps import open_map

@@ -6,7 +6,7 @@ from matplotlib.collections import PathCollection
 
 from vibench.analysis import Simulation, analyse_files, recorded_response
 from vibench.analysis.report import map_figure, write_report
-from vibench.analysis.report._report import draw_maps
+from vibench.analysis.report._maps import draw_maps
 from vibench.sim.maps import Map, Range, solve_map
 
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.analysis.figures.style import figure_style, magnitude_axis, new_figure
+from vibench.analysis.report._style import figure_style, magnitude_axis, new_figure
 
 
 def _numbers(low, high):

@@ -10,7 +10,7 @@ from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, NotEn
 from vibench.analysis.fit.lines import LINEAR, Parameter, parameter_value, with_values
 from vibench.analysis.fit.specimen_fit import Assumption, fit_specimen
 from vibench.analysis.frequency_response.results import FrequencyResponseSettings
-from vibench.analysis.signals.averaging import student_half_width
+from vibench.analysis.signals import student_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 NOMINAL = gong2025()

@@ -9,8 +9,8 @@ import pytest
 from tests.analysis import synthetic_recordings as synthetic
 from vibench.acquisition.plan import OddMultisine
 from vibench.analysis import analyse
-from vibench.analysis.figures.transmission import distortion_caption, distortion_figure
 from vibench.analysis.frequency_response.noise_response import distortion
+from vibench.analysis.report._transmission import distortion_caption, distortion_figure
 
 REPETITION_HZ, PERIODS, REALISATIONS, SETTLE_S = 4.0, 4, 4, 0.5
 NOISE_M_PER_S = 2e-5

@@ -17,7 +17,7 @@ from vibench.analysis import (
     parse_view,
 )
 from vibench.analysis.frequency_response.results import longest_segment
-from vibench.analysis.signals.averaging import effective_averages, hop_samples, taper
+from vibench.analysis.signals import effective_averages, hop_samples, taper
 
 RATE = 6400.0
 

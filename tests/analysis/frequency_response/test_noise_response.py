@@ -12,7 +12,7 @@ from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.analysis import NotEnoughData
 from vibench.analysis.frequency_response.noise_response import implausible_static_ratio, streamed_response
 from vibench.analysis.recordings.channels import RecordedChannels
-from vibench.analysis.signals.averaging import phase_half_width
+from vibench.analysis.signals import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"

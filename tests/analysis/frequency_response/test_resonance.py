@@ -20,8 +20,7 @@ from vibench.analysis.frequency_response.results import (
     converted_frequency_response,
 )
 from vibench.analysis.frequency_response.transmissibility import steady_relative_sd
-from vibench.analysis.signals.averaging import student_half_width
-from vibench.analysis.signals.quantity import Quantity
+from vibench.analysis.signals import Quantity, student_half_width
 
 
 def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99):

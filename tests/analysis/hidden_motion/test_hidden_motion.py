@@ -9,11 +9,11 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
 from vibench.analysis.hidden_motion import Hidden, Numbers, hidden_motion
 from vibench.analysis.hidden_motion._hidden_motion import hidden_motion_of, measured_masses
 from vibench.analysis.hidden_motion._prepared_motion import prepared_motion
 from vibench.analysis.hidden_motion._tracking_model import tracked_specimen
+from vibench.analysis.report._hidden_motion import hidden_impacts_figure, hidden_motion_figure
 from vibench.sim import HuntCrossley, LinearGap, RigidStops, gong2025
 
 SCORED_FROM_S = 0.4

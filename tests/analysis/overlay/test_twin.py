@@ -10,12 +10,12 @@ from tests.analysis.virtual_measurements import record, sampled_at, weak_noise
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import Dwell, SineSweep
 from vibench.analysis import Simulation, analyse, result_summary
-from vibench.analysis.figures.dwells import dwells_figure
-from vibench.analysis.figures.sweep import sweep_figure
 from vibench.analysis.kinds import Result
 from vibench.analysis.overlay.driven_rig import Driven, fit_shaker
 from vibench.analysis.overlay.overlay import PHASE
 from vibench.analysis.recordings.channels import ALIGNMENT_ERRORS
+from vibench.analysis.report._dwells import dwells_figure
+from vibench.analysis.report._sweep import sweep_figure
 from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
 

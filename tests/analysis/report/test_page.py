@@ -7,7 +7,7 @@ import pytest
 
 from tests.reading_reports import Page as Read
 from vibench.analysis.report import Agreement, Card, Fold, Page, ReportTable, write_page
-from vibench.analysis.report._page import LONGEST_CAPTION, MOST_OPEN_CARDS, split_caption
+from vibench.analysis.report._report import LONGEST_CAPTION, MOST_OPEN_CARDS, split_caption
 
 HOSTILE = '<script>alert("x")</script>'
 

@@ -23,8 +23,7 @@ from vibench.analysis import (
 from vibench.analysis.kinds import Result
 from vibench.analysis.recordings.checks import Check, Verdict
 from vibench.analysis.report import draw_cards, recording_figures, result_figures, write_report
-from vibench.analysis.report._page import LONGEST_CAPTION
-from vibench.analysis.report._report import CHANGE_A_CONCLUSION
+from vibench.analysis.report._report import CHANGE_A_CONCLUSION, LONGEST_CAPTION
 from vibench.analysis.tables import plus_minus
 
 pytestmark = pytest.mark.thorough

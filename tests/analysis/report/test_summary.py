@@ -5,7 +5,7 @@ from types import SimpleNamespace as Of
 import numpy as np
 import pytest
 
-from vibench.analysis.chaos.verdict import MotionKind
+from vibench.analysis.chaos.verdict import MotionKind, MotionVerdict
 from vibench.analysis.report import Agreement
 from vibench.analysis.report._drawings import noise_findings
 from vibench.analysis.report._report import MOST_WORDS, summary
@@ -25,7 +25,7 @@ def noise(vpp, *peaks_hz, band_hz=(50.0, 600.0), specimen="paper"):
 
 
 def dwell(vpp, kind, frequency_hz=260.0, period=None):
-    verdict = Of(kind=kind, period=period, why="it is so")
+    verdict = MotionVerdict(kind, "it is so", evidence=None, period=period)
     facts = Of(bench={"specimen": "paper"}, feedback=())
     excitation = Of(amplitude_vpp=vpp, frequency_hz=frequency_hz)
     return Of(kind="dwell", analysis=Of(excitation=excitation, motion=Of(verdict=verdict), facts=facts))

@@ -11,7 +11,7 @@ from vibench.acquisition.recording import ResultArray
 from vibench.analysis import Simulation, analyse_files, campaign_summary, compare_recording, recordings_in
 from vibench.analysis.frequency_response.results import FrequencyResponseRequest
 from vibench.analysis.report import check_warnings
-from vibench.analysis.report._comparison_export import write_comparison
+from vibench.analysis.report._comparison import write_comparison
 
 
 @pytest.fixture(scope="module")

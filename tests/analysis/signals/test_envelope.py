@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vibench.analysis.signals.arrays import envelope
+from vibench.analysis.signals import envelope
 
 
 @given(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.signals.interpolation import REACH, interpolate
+from vibench.analysis.signals import REACH, interpolate
 
 RNG = np.random.default_rng(5)
 SAMPLES = 3000

@@ -6,7 +6,7 @@ from hypothesis import given, strategies as st
 
 from vibench.analysis import InvalidRequest, transmissibility
 from vibench.analysis.frequency_response.results import converted_frequency_response
-from vibench.analysis.signals.quantity import Quantity, converted_signal, derivative_factor
+from vibench.analysis.signals import Quantity, converted_signal, derivative_factor
 
 RATE = 5120.0
 

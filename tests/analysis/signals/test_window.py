@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import get_window
 
-from vibench.analysis.signals.averaging import Window, taper
+from vibench.analysis.signals import Window, taper
 
 
 @pytest.mark.parametrize("window", Window)

@@ -5,7 +5,7 @@ import pytest
 
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.signals.averaging import standard_uncertainty
+from vibench.analysis.signals import standard_uncertainty
 from vibench.analysis.sine.dwell import dwell_response
 from vibench.analysis.sine.dwell_analysis import stroboscope
 from vibench.analysis.spectra import spectral_density

@@ -6,7 +6,7 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.analysis import analyse
 from vibench.analysis.chaos.verdict import MotionKind
-from vibench.analysis.figures.dwells import portraits_figure
+from vibench.analysis.report._dwells import portraits_figure
 
 
 @pytest.fixture(scope="module")

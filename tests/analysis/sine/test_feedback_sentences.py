@@ -10,14 +10,14 @@ from tests.analysis.virtual_measurements import record, sampled_at
 from vibench.acquisition.plan import ResonanceTracking, SettledSine
 from vibench.acquisition.recording import Hold, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.analysis import CampaignResults, analyse, result_summary
-from vibench.analysis.figures.stepped_sine import (
+from vibench.analysis.kinds import Result
+from vibench.analysis.report import findings, result_figures
+from vibench.analysis.report._stepped_sine import (
     STEPPED_FREQUENCIES,
     TRACKED_RESONANCE,
     backbone_figure,
     stepped_sine_figure,
 )
-from vibench.analysis.kinds import Result
-from vibench.analysis.report import findings, result_figures
 from vibench.analysis.sine.stepped_response import feedback_sentences, noted_jumps
 
 JUMP = JumpNote(

@@ -11,7 +11,7 @@ from tests.analysis.virtual_measurements import RIG, record, simulated_with
 from vibench.acquisition.plan import Dwell
 from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
 from vibench.analysis.chaos.verdict import MotionKind
-from vibench.analysis.report._result_tables import dwell_table
+from vibench.analysis.report._drawings import dwell_table
 from vibench.analysis.uncertainty.budget import Cause
 from vibench.sim import base_transmissibility
 

@@ -14,7 +14,7 @@ from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.channels import Stretch
 from vibench.analysis.recordings.checks import Verdict
-from vibench.analysis.signals.interpolation import Decimator
+from vibench.analysis.signals import Decimator
 from vibench.analysis.sine.sweep import SweepSums, drive_phase
 from vibench.analysis.sine.sweep_analysis import collisions, measured_sweep, played_check
 from vibench.analysis.tones import track_orders

@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 from scipy import signal
 
 from vibench.analysis import InvalidRequest
-from vibench.analysis.signals.quantity import Quantity
+from vibench.analysis.signals import Quantity
 from vibench.analysis.spectra import amplitude_spectrum, spectral_density
 from vibench.analysis.tones import largest_peak
 

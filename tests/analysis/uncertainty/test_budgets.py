@@ -13,7 +13,7 @@ from vibench.acquisition.rig import StatedUncertainty, VibrometerConfig
 from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
 from vibench.analysis.overlay.ensemble import EnsembleCurve
 from vibench.analysis.overlay.overlay import RESPONSE_I, RESPONSE_II
-from vibench.analysis.report._result_tables import uncertainty_table
+from vibench.analysis.report._drawings import uncertainty_table
 from vibench.analysis.sine.dwell import dwell_response
 from vibench.analysis.uncertainty.budget import (
     Budget,

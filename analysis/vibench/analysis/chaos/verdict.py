@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import Tabular
 from .witnesses import (
     FEWEST,
@@ -302,6 +302,13 @@ class MotionVerdict(Tabular):
     evidence: Evidence
     period: int | None = None
     """Number of drive periods after which a periodic motion repeats itself."""
+
+    @property
+    def text(self) -> str:
+        """Kind of motion in a few words."""
+        if self.kind is MotionKind.PERIODIC and self.period is not None and self.period > 1:
+            return f"periodic, {self.period} drive periods"
+        return self.kind.value
 
     @property
     def least_exponent_per_s(self) -> float | None:

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals.arrays import Flags, Integers, Reals
+from ..signals import Flags, Integers, Reals
 
 _MOST_TRIED = 64
 """A quarter of the largest number of nearest points searched for a neighbour that is distant in time."""

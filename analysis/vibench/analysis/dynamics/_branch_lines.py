@@ -20,7 +20,7 @@ from vibench.sim.branches import (
 )
 
 from ..comparison import Curve, CurveKind, CurveOrigin
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import Tabular, columns
 from ._requests import BranchMethod, BranchRequest
 

@@ -33,7 +33,7 @@ from ..frequency_response.transmissibility import transmissibility
 from ..overlay.simulated_channels import recorded_base_motion
 from ..recordings.channels import BASE
 from ..recordings.facts import plan_of, require_intact, require_measured_size, require_usable
-from ..signals.arrays import PER_NEPER_DB, Reals
+from ..signals import PER_NEPER_DB, Reals
 from ..tables import Tabular
 from ._requests import ChainDrive, ChainRequest
 

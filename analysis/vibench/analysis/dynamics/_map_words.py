@@ -1,7 +1,7 @@
 """Texts of a map: classes and names of motions, a caption, and the comparison with recorded levels."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,8 @@ from vibench.sim.maps import QUANTITIES, Map, MapMotion, MapResults
 
 from ..comparison import Curve
 from ..errors import NotEnoughData
-from ..signals.arrays import Reals
+from ..recordings.facts import specimen_difference as specimen_difference, value_words
+from ..signals import Reals
 
 MOTION_CLASSES = (
     ("no impacts", "#eef3f7"),
@@ -103,17 +104,6 @@ def _consts(plan: Map) -> list[str]:
     ]
 
 
-def value_words(value: object) -> str:
-    """Return a value of a specimen as text."""
-    match value:
-        case tuple():
-            return f"[{', '.join(value_words(each) for each in value)}]"
-        case float():
-            return f"{value:g}"
-        case _:
-            return str(value)
-
-
 @dataclass(frozen=True, eq=False)
 class RecordedLevel:
     """Measured base amplitude and Response I of a recording over frequency."""
@@ -129,33 +119,6 @@ class RecordedLevel:
     def difference(self, simulated: Specimen) -> str:
         """Return how a simulated specimen differs from the recorded one; see `specimen_difference`."""
         return specimen_difference(simulated, self.specimen, self.name)
-
-
-def specimen_difference(simulated: Specimen, recorded: Specimen | None, name: str) -> str:
-    """Return a sentence on how a simulated specimen differs from the recorded one; empty if they are equal.
-
-    Parameters
-    ----------
-    name
-        Name of the recording.
-    """
-    if recorded is None:
-        return f"{name} describes no specimen, so the simulated specimen could not be compared with it."
-    pairs = zip(_properties(simulated), _properties(recorded), strict=True)
-    changed = "; ".join(f"{ours} instead of {theirs}" for ours, theirs in pairs if ours != theirs)
-    return f"The simulated specimen is not the one described in {name}: {changed}." if changed else ""
-
-
-def _properties(specimen: Specimen) -> tuple[str, ...]:
-    """Return the properties of a specimen in words; the order of the properties is always the same."""
-    law = ", ".join(f"{name} {value_words(value)}" for name, value in asdict(specimen.contact).items())
-    return (
-        f"masses {value_words(specimen.masses)} kg",
-        f"stiffnesses {value_words(specimen.stiffnesses)} N/m",
-        f"dampings {value_words(specimen.dampings)} N s/m",
-        f"gaps {value_words(specimen.gaps_m)} m",
-        f"contact {law}",
-    )
 
 
 MOST_BINS = 100

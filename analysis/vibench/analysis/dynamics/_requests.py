@@ -33,7 +33,7 @@ from vibench.sim.branches import MotionSearch
 from vibench.sim.chain import MOST_CELLS, Chain
 from vibench.sim.study import TargetError, TargetTime, frequency_range
 
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import Tabular, columns
 from ._specimen_choice import SpecimenChoice
 

@@ -16,7 +16,7 @@ from typing import TextIO
 
 import numpy as np
 
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import Source, SourceChannel, own_facts, read_from, scale_among, unit_among
 from ._times import UNITS, stated_times

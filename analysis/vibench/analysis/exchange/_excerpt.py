@@ -14,7 +14,7 @@ from vibench.acquisition.recording import ChannelHeader, RecordedBlock, Recordin
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.facts import require_checked
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import columns
 
 BLOCK_SAMPLES = 51_200

@@ -15,7 +15,7 @@ from vibench.acquisition.recording import Origin
 from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5, system_error, walk
 
 from ..errors import UnusableData
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._source_channel import Read, Source, SourceChannel, exact_step, own_facts, scale_among, unit_among
 from ._times import stated_times
 

@@ -32,7 +32,7 @@ from vibench.acquisition.recording import (
 from ..errors import InvalidRequest, UnusableData
 from ..recordings.channels import ALIGNMENT_ERRORS, BASE, DRIVE
 from ..recordings.facts import channel_levels, require_moving_channels
-from ..signals.arrays import Reals, runs_of
+from ..signals import Reals, runs_of
 from ._alignment import Alignment, Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, ignore_progress
 from ._mapping import KNOWN_ROLES, ChannelMapping, ImportMapping

@@ -20,7 +20,7 @@ from scipy.io.matlab import MatReadError
 from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, facts_document, ignore_progress
 from ._hdf5_source import FEWEST_SAMPLES, open_hdf5_source
 from ._source_channel import (

@@ -14,7 +14,7 @@ from vibench.acquisition import shorten
 from vibench.sim.hdf5_files import system_error
 
 from ..errors import InvalidRequest, UnusableData
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._csv import open_csv
 from ._hdf5_source import open_hdf5_source
 from ._mapping import unit_in_name

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vibench.acquisition import shorten
 from vibench.acquisition.recording import Origin
 
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._excerpt import BLOCK_SAMPLES
 
 EXACT_KINDS = {"i": 4, "u": 2}

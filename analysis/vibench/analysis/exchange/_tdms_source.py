@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._source_channel import Source, SourceChannel, exact_step, scale_among, unit_among
 from ._times import restarts, stated_start, stated_times
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._source_channel import MOST_CHANNELS, SECONDS, SourceChannel, own_facts, rate_bounds, text_of
 
 _HERTZ = {"hz": 1.0, "s/s": 1.0, "khz": 1e3, "mhz": 1e6, "ks/s": 1e3, "ms/s": 1e6}

@@ -27,7 +27,7 @@ from scipy.interpolate import CubicSpline
 from vibench.acquisition.recording import ChannelHeader, Origin, Recording, RecordingDescription
 
 from ..errors import UnusableData
-from ..signals.arrays import Complexes, Reals
+from ..signals import Complexes, Reals
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import SECONDS, Read, Source, SourceChannel, rate_bounds, text_of
 from ._times import agrees

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, ignore_progress
 from ._source_channel import Source, SourceChannel
 

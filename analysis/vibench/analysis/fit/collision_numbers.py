@@ -22,8 +22,7 @@ from ..errors import AnalysisError, NotEnoughData
 from ..hidden_motion import FoundParameter, Hidden, hidden_motion
 from ..overlay.driven_rig import FittedShaker, described_shaker, fit_shaker
 from ..results.campaign_results import CampaignResults
-from ..signals.arrays import Complexes, Reals
-from ..signals.averaging import DEFAULT_CONFIDENCE
+from ..signals import DEFAULT_CONFIDENCE, Complexes, Reals
 from ..sine.dwell_analysis import DwellAnalysis, DwellPlan
 from ..sine.sweep_analysis import SweepAnalysis
 from .lines import FittedValue, Parameter, parameter_value, with_values

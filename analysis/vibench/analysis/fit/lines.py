@@ -13,8 +13,7 @@ from vibench.sim import Specimen
 
 from ..errors import NotEnoughData
 from ..frequency_response.results import FrequencyResponse
-from ..signals.arrays import Complexes, Reals
-from ..signals.averaging import chi_square_limit, chi_square_of, line_correlation
+from ..signals import Complexes, Reals, chi_square_limit, chi_square_of, line_correlation
 from ..tables import unit_of
 
 

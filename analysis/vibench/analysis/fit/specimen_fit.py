@@ -13,8 +13,7 @@ from vibench.sim import Specimen
 
 from ..errors import InvalidRequest
 from ..frequency_response.results import FrequencyResponse
-from ..signals.arrays import Complexes, Reals
-from ..signals.averaging import DEFAULT_CONFIDENCE
+from ..signals import DEFAULT_CONFIDENCE, Complexes, Reals
 from ..tables import Tabular
 from .lines import (
     ALSO_FREE,

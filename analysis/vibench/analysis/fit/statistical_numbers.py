@@ -16,7 +16,7 @@ from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..hidden_motion import FoundParameter, Hidden, tracked_specimen, value_of, with_values
 from ..overlay.draws import StretchDraws, stretch_draws
 from ..overlay.driven_rig import FittedShaker
-from ..signals.arrays import Flags, Integers, Reals
+from ..signals import Flags, Integers, Reals
 from .specimen_fit import SpecimenFit
 
 # Approximate Bayesian computation with regression: parameters of a model from statistics of its runs.

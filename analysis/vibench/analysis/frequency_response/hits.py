@@ -6,8 +6,7 @@ import numpy as np
 
 from ..errors import NotEnoughData
 from ..recordings.channels import RecordedChannels, Stretch
-from ..signals.arrays import Complexes, Reals
-from ..signals.averaging import Window
+from ..signals import Complexes, Reals, Window
 from ..spectra import SpectralAverages
 from .modal_fit import Resonance
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings

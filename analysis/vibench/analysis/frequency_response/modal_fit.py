@@ -8,8 +8,18 @@ from typing import ClassVar
 import numpy as np
 import scipy
 
-from ..signals.arrays import Complexes, Flags, Integers, Reals
-from ..signals.averaging import Window, chi_square_limit, chi_square_of, cosine_weights, hop_samples, taper
+from ..signals import (
+    Complexes,
+    Flags,
+    Integers,
+    Reals,
+    Window,
+    chi_square_limit,
+    chi_square_of,
+    cosine_weights,
+    hop_samples,
+    taper,
+)
 from .results import FrequencyResponse
 
 SMALLEST_RELATIVE_SD = 1e-6

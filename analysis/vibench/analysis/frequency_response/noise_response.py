@@ -13,9 +13,16 @@ from vibench.acquisition.recording import SegmentLabel
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.channels import FORCE, RecordedChannels, Stretch, only_stretch
 from ..recordings.checks import AbstractAnalysis
-from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.averaging import Window, coherence_significance, relative_sd, student_half_width
-from ..signals.quantity import Quantity
+from ..signals import (
+    Complexes,
+    Flags,
+    Quantity,
+    Reals,
+    Window,
+    coherence_significance,
+    relative_sd,
+    student_half_width,
+)
 from ..spectra import DensitySums
 from ..tables import Tabular, columns
 from ..tones import NoiseDriveLevel, noise_drive_level

@@ -16,9 +16,18 @@ import scipy
 from scipy import fft
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
-from ..signals.arrays import Complexes, Flags, Integers, Reals
-from ..signals.averaging import DEFAULT_CONFIDENCE, Window, coherence_significance
-from ..signals.interpolation import REACH, TRUSTED_BAND, interpolate
+from ..signals import (
+    DEFAULT_CONFIDENCE,
+    REACH,
+    TRUSTED_BAND,
+    Complexes,
+    Flags,
+    Integers,
+    Reals,
+    Window,
+    coherence_significance,
+    interpolate,
+)
 from ..tables import Tabular
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from .transmissibility import coherence, steady_relative_sd

@@ -9,8 +9,7 @@ import scipy
 from threadpoolctl import threadpool_limits
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Complexes, Reals
-from ..signals.averaging import standard_uncertainty
+from ..signals import Complexes, Reals, standard_uncertainty
 from .modal_fit import (
     LARGEST_DAMPING,
     SMALLEST_RELATIVE_SD,

@@ -7,16 +7,19 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.averaging import (
+from ..signals import (
     DEFAULT_CONFIDENCE,
+    Complexes,
+    Flags,
+    Quantity,
+    Reals,
     Window,
+    derivative_factor,
     hop_samples,
     magnitude_bounds,
     phase_half_width,
     taper,
 )
-from ..signals.quantity import Quantity, derivative_factor
 from ..tables import Tabular
 
 LEAST_COHERENCE = 0.1

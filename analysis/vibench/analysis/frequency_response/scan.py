@@ -9,8 +9,7 @@ import numpy as np
 
 from vibench.acquisition.plan import ScanPoint
 
-from ..signals.arrays import Complexes, Reals
-from ..signals.averaging import magnitude_bounds, phase_half_width
+from ..signals import Complexes, Reals, magnitude_bounds, phase_half_width
 from .noise_response import NoiseAnalysis
 
 _SAME = 0.03

@@ -6,9 +6,11 @@ from math import ceil
 import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.averaging import (
+from ..signals import (
     DEFAULT_CONFIDENCE,
+    Complexes,
+    Flags,
+    Reals,
     Window,
     by_name,
     coherence_significance,

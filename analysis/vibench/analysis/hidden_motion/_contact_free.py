@@ -9,7 +9,7 @@ import numpy as np
 from vibench.sim.engine.run import native_engine
 
 from ..errors import NotEnoughData
-from ..signals.arrays import Flags, Reals, Samples, runs_of
+from ..signals import Flags, Reals, Samples, runs_of
 from ..tables import Tabular
 from ._filtering import MotionModel, motion_model, run_filter
 from ._prepared_motion import PreparedMotion

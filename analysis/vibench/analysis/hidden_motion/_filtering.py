@@ -9,7 +9,7 @@ from vibench.sim import Specimen
 from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
 
-from ..signals.arrays import Flags, Reals
+from ..signals import Flags, Reals
 from ._prepared_motion import ChannelNoise, PreparedMotion
 from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_tables
 

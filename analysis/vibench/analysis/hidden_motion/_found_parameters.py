@@ -13,7 +13,7 @@ from typing import ClassVar, TypeGuard
 import numpy as np
 from scipy.stats import t as student
 
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import Tabular, unit_of, with_unit
 from ._contact_free import (
     FEWEST_IMPACTS,

@@ -15,7 +15,7 @@ from vibench.sim.background import Observer, ignore_progress, stage
 from ..errors import InvalidRequest, UnusableData
 from ..recordings.channels import BASE, RESPONSE, ResponseChannel, response_roles
 from ..recordings.facts import require_checked, require_usable, specimen_of
-from ..signals.arrays import Reals, Samples
+from ..signals import Reals, Samples
 from ..tables import Tabular, columns, plain, with_unit
 from ._contact_free import (
     Collisions,

@@ -10,7 +10,7 @@ from vibench.acquisition.recording import open_recording
 from vibench.sim import UnknownSpecimenError, load_specimen
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Reals, Samples
+from ..signals import Reals, Samples
 from ..tables import Tabular
 from ._tracking_model import Numbers
 

@@ -25,7 +25,7 @@ from vibench.sim import FrozenModel, Specimen
 from vibench.sim.operating_system.this import replace_file, state_folder
 
 from ..recordings.channels import BASE, RESPONSE
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import Tabular
 from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, run_filter
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen

@@ -11,7 +11,7 @@ from vibench.acquisition.recording import BridgedChannel, Dropout, Recording, co
 
 from ..errors import NotEnoughData, UnusableData
 from ..recordings.channels import BASE, RESPONSE, SensedChannel, sensor_gain
-from ..signals.arrays import Complexes, Flags, Reals, Samples
+from ..signals import Complexes, Flags, Reals, Samples
 
 HALF_LENGTH = 16
 """Samples on each side that a corrected sample needs: a third of a millisecond at 51.2 kS/s."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ..signals.arrays import Flags, Reals, runs_of
+from ..signals import Flags, Reals, runs_of
 from ._filtering import (
     LOSS_LIMIT,
     FilterPredictions,

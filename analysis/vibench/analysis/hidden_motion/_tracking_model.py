@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from vibench.sim import PowerLaw, RigidStops, Specimen
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Reals
+from ..signals import Reals
 
 STATES = 8
 """States: X, Y, Z and their rates relative to the base, base velocity W, error B of the acceleration, SI.

@@ -27,7 +27,7 @@ from vibench.acquisition.recording import (
 
 from ..errors import InvalidRequest
 from ..recordings.channels import RESPONSE, OnRead, ignore_reading
-from ..signals.arrays import Reals
+from ..signals import Reals
 
 # Envelopes: the smallest and largest sample in every column of the picture. Every sample belongs to a column,
 # so an impact of three samples is visible at any zoom. Drawing every n-th sample would show it in only a few

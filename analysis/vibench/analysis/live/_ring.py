@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidRequest
-from ..signals.arrays import Reals
+from ..signals import Reals
 
 Values = NDArray[np.float32]
 

@@ -7,9 +7,7 @@ import numpy as np
 from scipy import fft
 
 from ..errors import NotEnoughData
-from ..signals.arrays import Complexes, Reals
-from ..signals.averaging import Window, taper
-from ..signals.quantity import Quantity, converted_signal
+from ..signals import Complexes, Quantity, Reals, Window, converted_signal, taper
 from ..tables import Tabular
 from ..tones import between_lines
 from ._outline import Samples

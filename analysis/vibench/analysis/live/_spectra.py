@@ -18,9 +18,16 @@ from ..frequency_response.results import (
     converted_frequency_response,
 )
 from ..frequency_response.transmissibility import frequency_response_of
-from ..signals.arrays import Flags, Reals
-from ..signals.averaging import DEFAULT_CONFIDENCE, Window, effective_averages, hop_samples, taper
-from ..signals.quantity import Quantity
+from ..signals import (
+    DEFAULT_CONFIDENCE,
+    Flags,
+    Quantity,
+    Reals,
+    Window,
+    effective_averages,
+    hop_samples,
+    taper,
+)
 from ..spectra import SpectralAverages, Spectrogram, SpectrogramSums
 from ..tables import Tabular
 from ._ring import Values

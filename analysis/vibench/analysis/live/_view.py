@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ..frequency_response.results import FrequencyResponse
 from ..recordings.channels import BASE, DRIVE, RESPONSE, RESPONSE_ROLES
-from ..signals.arrays import Reals
-from ..signals.quantity import Quantity
+from ..signals import Quantity, Reals
 from ._outline import Picture, column_starts, outline
 from ._ring import Level, LevelMeters, Ring, Values
 from ._sine_response import (

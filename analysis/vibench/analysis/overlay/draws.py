@@ -21,7 +21,7 @@ from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
 
 from ..errors import UnusableData
 from ..recordings.channels import BASE, VELOCITY, RecordedChannels, alignment_error_s, noise_as_read
-from ..signals.arrays import Complexes, Reals, Samples
+from ..signals import Complexes, Reals, Samples
 from ..sine.dwell import silence_before
 from .driven_rig import (
     Driven,

@@ -20,7 +20,7 @@ from ..errors import UnusableData
 from ..frequency_response.noise_response import NoiseAnalysis, repeated_response, streamed_response
 from ..frequency_response.results import FrequencyResponse
 from ..recordings.channels import BASE, DRIVE, RecordedChannels, ResponseChannel, coupled_gain, sensor_gain
-from ..signals.arrays import Complexes, Flags, Reals
+from ..signals import Complexes, Flags, Reals
 from ..tables import plus_minus
 
 AMPLIFIER = "amplifier_voltage"

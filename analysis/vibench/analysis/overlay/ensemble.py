@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy
 
-from ..signals.arrays import PER_NEPER_DB, Flags, Integers, Reals
+from ..signals import PER_NEPER_DB, Flags, Integers, Reals
 from ..tables import Tabular
 
 AGREEMENT = 0.99

@@ -23,7 +23,7 @@ from vibench.sim import (
 
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..frequency_response.results import FrequencyResponse
-from ..signals.arrays import Envelope, Flags, Integers, Reals, runs_of
+from ..signals import Envelope, Flags, Integers, Reals, runs_of
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import (
     DwellAnalysis,

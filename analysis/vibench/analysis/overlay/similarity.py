@@ -6,7 +6,7 @@ from enum import StrEnum
 import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals.arrays import Flags, Reals
+from ..signals import Flags, Reals
 from ..tables import Tabular
 
 SIMILARITY_THRESHOLD = 0.1

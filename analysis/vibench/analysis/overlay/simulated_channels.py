@@ -13,8 +13,7 @@ from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
 
 from ..errors import UnusableData
 from ..recordings.channels import BASE, DRIVE, RecordedChannels
-from ..signals.arrays import Complexes, Integers, Reals, Samples
-from ..signals.quantity import Quantity, converted_signal
+from ..signals import Complexes, Integers, Quantity, Reals, Samples, converted_signal
 
 _LOWEST_PART = 0.25
 """High-pass frequency relative to the lowest drive frequency; prevents drift by double integration."""

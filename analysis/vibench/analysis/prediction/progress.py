@@ -48,7 +48,7 @@ from ..dynamics import (
 )
 from ..errors import AnalysisError
 from ..overlay.similarity import Similarity, SimilarityCurve, similarity
-from ..signals.arrays import Reals, runs_of
+from ..signals import Reals, runs_of
 
 BETWEEN_PICTURES_S = 0.5
 PERIODS, SAMPLES = 64, 256

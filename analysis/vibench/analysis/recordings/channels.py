@@ -22,7 +22,7 @@ from vibench.acquisition.recording import (
 from vibench.acquisition.rig import RESPONSE_ROLES as ROLES, Channel, sensor_table
 
 from ..errors import NotEnoughData, UnusableData
-from ..signals.arrays import Complexes, Flags, Reals, Samples
+from ..signals import Complexes, Flags, Reals, Samples
 
 VELOCITY = ROLES[0].value
 RESPONSE_ROLES = tuple(role.value for role in ROLES)

@@ -1,7 +1,7 @@
 """Facts of a recording: the measurement, its instruments, how it ended, and the level of each channel."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from functools import reduce
 from typing import Annotated, Any, ClassVar
 
@@ -25,7 +25,7 @@ from vibench.acquisition.recording import (
 from vibench.sim import Specimen, SpecimenTable, fault_in_words
 
 from ..errors import NotEnoughData, UnusableData
-from ..signals.arrays import DEFAULT_BINS, Envelope, Integers, Reals, runs_of
+from ..signals import DEFAULT_BINS, Envelope, Integers, Reals, runs_of
 from .channels import (
     ACCELERATION,
     BASE,
@@ -525,6 +525,44 @@ def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
             f"the specimen described in the recording is not valid ({'.'.join(map(str, first['loc']))}: "
             f"{first['msg']}); the samples can be read with h5py"
         ) from error
+
+
+def specimen_difference(simulated: Specimen, recorded: Specimen | None, name: str) -> str:
+    """Return a sentence on how a simulated specimen differs from the recorded one; empty if they are equal.
+
+    Parameters
+    ----------
+    name
+        Name of the recording.
+    """
+    if recorded is None:
+        return f"{name} describes no specimen, so the simulated specimen could not be compared with it."
+    pairs = zip(_properties(simulated), _properties(recorded), strict=True)
+    changed = "; ".join(f"{ours} instead of {theirs}" for ours, theirs in pairs if ours != theirs)
+    return f"The simulated specimen is not the one described in {name}: {changed}." if changed else ""
+
+
+def _properties(specimen: Specimen) -> tuple[str, ...]:
+    """Return the properties of a specimen in words; the order of the properties is always the same."""
+    law = ", ".join(f"{name} {value_words(value)}" for name, value in asdict(specimen.contact).items())
+    return (
+        f"masses {value_words(specimen.masses)} kg",
+        f"stiffnesses {value_words(specimen.stiffnesses)} N/m",
+        f"dampings {value_words(specimen.dampings)} N s/m",
+        f"gaps {value_words(specimen.gaps_m)} m",
+        f"contact {law}",
+    )
+
+
+def value_words(value: object) -> str:
+    """Return a value of a specimen as text."""
+    match value:
+        case tuple():
+            return f"[{', '.join(value_words(each) for each in value)}]"
+        case float():
+            return f"{value:g}"
+        case _:
+            return str(value)
 
 
 class _Finding(BaseModel):

@@ -12,28 +12,7 @@ from vibench.acquisition.plan import EXCITATION_KINDS, Family, excitation_text, 
 from vibench.sim import Specimen
 
 from ..chaos.verdict import MotionKind
-from ..dynamics import specimen_difference
-from ..figures.dwells import dwells_figure, portraits_figure, verdict_text
-from ..figures.ensemble_band import agreement_text
-from ..figures.recording import bench_levels_figure, excitation_figure
-from ..figures.stepped_sine import (
-    STEPPED_FREQUENCIES,
-    STEPPED_LEVELS,
-    TRACKED_RESONANCE,
-    SteppedLook,
-    backbone_figure,
-    stepped_level_caption,
-    stepped_sine_figure,
-)
-from ..figures.style import DrawnFigure
-from ..figures.sweep import hysteresis_figure, regions_text, sweep_figure, sweep_orders_figure
-from ..figures.transmission import (
-    distortion_figure,
-    scan_figure,
-    transmission_figure,
-    transmission_levels_figure,
-)
-from ..frequency_response.scan import scans_of
+from ..frequency_response.modal_fit import Resonance
 from ..kinds import (
     AnyResult,
     DwellResult,
@@ -43,14 +22,36 @@ from ..kinds import (
     SweepResult,
 )
 from ..overlay.draws import CLOCK_TOLERANCE
-from ..overlay.overlay import PREDICTION_S, WINDOW_S, AbstractOverlay
+from ..overlay.overlay import (
+    PAPER_RESONANCES_HZ,
+    PAPER_TERMINAL_RESONANCES_HZ,
+    PREDICTION_S,
+    RESPONSE_I,
+    RESPONSE_II,
+    WINDOW_S,
+    AbstractOverlay,
+    DwellOverlay,
+)
 from ..recordings.checks import AbstractAnalysis
-from ..recordings.facts import known_specimen
+from ..recordings.facts import known_specimen, specimen_difference, specimen_of
 from ..results.campaign_results import CampaignResults, budgets_of
 from ..sine.stepped_response import feedback_sentences, tracked_resonances
+from ..sine.sweep_analysis import Edge
 from ..tables import plus_minus
-from ._page import ReportTable
-from ._result_tables import collision_table, dwell_table, edge_text, line_table, resonance_table
+from ..uncertainty.budget import COVERAGE, Budget, Cause
+from ._recording import bench_levels_figure, excitation_figure
+from ._style import DrawnFigure, agreement_text
+from ._sweep import hysteresis_figure, regions_text, sweep_figure, sweep_orders_figure
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """Table of texts with a note below it."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
 
 
 def noise_findings(result: NoiseResult) -> Iterator[str]:
@@ -102,7 +103,7 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
     text = (
         f"Dwell at {plan.frequency_hz:g} Hz and {plan.amplitude_vpp:g} Vpp (A0 = "
         f"{1e6 * found.drive.amplitude_m:.3g} µm): Response I {found.response_i:.3g}, Response II "
-        f"{found.response_ii:.3g}, {verdict_text(verdict)}"
+        f"{found.response_ii:.3g}, {verdict.text}"
     )
     if verdict.kind is MotionKind.UNDECIDED:
         text += f" ({verdict.why})"
@@ -182,6 +183,232 @@ def limits(results: CampaignResults) -> Iterator[str]:
         )
 
 
+_NEAR = 0.08
+"""Largest relative distance between resonances in one table row; modes are at least 9 % apart."""
+ABSENT = "–"
+_SMALLEST_BIAS = 1e-3
+"""Smallest noise bias that is printed; a smaller bias does not matter."""
+_PAPER_COLLISION = "about 240 to 290 Hz"
+"""Collision region in Gong et al. 2025, section 5: the grey area of the sweep."""
+
+
+def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
+    """Return a table of measured, simulated, modelled and published resonances."""
+    return ReportTable(
+        "Resonances of the transmission",
+        (
+            "noise",
+            "measured [Hz]",
+            "damping ratio [%]",
+            "peak |F/U''| [kg]" if noise and noise[0].analysis.view.is_force else "peak |x/U|",
+            "simulated [Hz]",
+            "model [Hz]",
+            "paper [Hz]",
+        ),
+        tuple(row for each in noise for row in _resonance_rows(each)),
+        "± is two standard deviations, from the scatter of lines only. Simulated: one draw from the recorded "
+        "voltage or base motion, with the same estimator. Model: undamped natural frequency, without "
+        "contact or (terminal) with m1 stuck to m2. Paper: Gong et al. 2025, section 5.",
+    )
+
+
+def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
+    """Return a table of each quantity's uncertainty, with the contribution of each cause."""
+    return ReportTable(
+        "Contributions to the uncertainty",
+        ("recording", "quantity", "value", *(each.value for each in Cause)),
+        tuple(
+            (each.analysis.facts.name, budget.quantity, budget.text, *(_share(budget, c) for c in Cause))
+            for each in results
+            for budget in budgets_of(each)
+        ),
+        f"± is the expanded uncertainty, k = {COVERAGE:g}, of all stated contributions, as in JCGM "
+        "100:2008; each column is a relative standard uncertainty. Contributions that the hardware "
+        "configuration does not state are not included. Chance: difference between repeated runs.",
+    )
+
+
+def _share(budget: Budget, cause: Cause) -> str:
+    share = budget.share(cause)
+    if share is None:
+        return "not stated"
+    return f"{100 * share:.2g} %" if share else ABSENT
+
+
+def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
+    level = f"{result.analysis.excitation.amplitude_vpp:g} Vpp"
+    specimen = specimen_of(result.analysis.facts.bench)
+    free = [(float(each), "") for each in specimen.natural_frequencies_hz]
+    bound = [(float(each), " (terminal)") for each in specimen.bound_frequencies_hz]
+    paper = [(each, "") for each in PAPER_RESONANCES_HZ] + [
+        (each, " (terminal)") for each in PAPER_TERMINAL_RESONANCES_HZ
+    ]
+    simulated = () if result.overlay is None else result.overlay.response.resonances
+    found = result.analysis.response.resonances
+    if not found:
+        yield level, "none above its uncertainty", *([ABSENT] * 5)
+    for each in found:
+        beside = nearest_resonance(each.frequency_hz, simulated)
+        yield (
+            level,
+            plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz),
+            plus_minus(100 * each.damping_ratio, 200 * each.sd_damping_ratio),
+            plus_minus(each.peak_magnitude, 2 * each.sd_peak_magnitude),
+            ABSENT if beside is None else plus_minus(beside.frequency_hz, 2 * beside.sd_frequency_hz),
+            _nearest(each.frequency_hz, [*free, *bound], ".1f"),
+            _nearest(each.frequency_hz, paper, ".0f"),
+        )
+
+
+def nearest_resonance(frequency_hz: float, among: Sequence[Resonance]) -> Resonance | None:
+    """Return the nearest resonance if it is close enough to be the same mode, else None."""
+    near = [each for each in among if abs(each.frequency_hz - frequency_hz) < _NEAR * frequency_hz]
+    return min(near, key=lambda each: abs(each.frequency_hz - frequency_hz), default=None)
+
+
+def _nearest(frequency_hz: float, among: Sequence[tuple[float, str]], form: str) -> str:
+    value, note = min(among, key=lambda each: abs(each[0] - frequency_hz))
+    if abs(value - frequency_hz) > _NEAR * frequency_hz:
+        return ABSENT
+    return f"{value:{form}}{note}"
+
+
+def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
+    """Return a table of the collision regions in each sweep: measured, simulated and published."""
+    return ReportTable(
+        "Frequencies with collisions in a sweep",
+        ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
+        tuple(row for each in sweeps for row in _collision_rows(each)),
+        "Bounds are the nearest interval clearly without collisions and the first or last interval clearly "
+        "with collisions. The end of the collisions is random, and differs between runs. "
+        "The motion that a sweep follows depends on its direction and on its first frequency.",
+    )
+
+
+def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
+    plan = result.analysis.excitation
+    name = f"{plan.amplitude_vpp:g} Vpp, {plan.start_hz:g} to {plan.stop_hz:g} Hz"
+    measured = result.analysis.collisions.regions
+    simulated = () if result.overlay is None else result.overlay.collisions.regions
+    if not measured and not simulated:
+        found = "not determined" if result.analysis.collisions.too_fast_hz else "no collision"
+        yield name, found, ABSENT, ABSENT, ABSENT, _PAPER_COLLISION
+    for number in range(max(len(measured), len(simulated))):
+        cells = [name]
+        for regions in (measured, simulated):
+            if number < len(regions):
+                region = regions[number]
+                cells.append(edge_text(region.start, "start of sweep" if region.reaches_start else ""))
+                cells.append(edge_text(region.stop, "end of sweep" if region.reaches_stop else ""))
+            else:
+                cells += [ABSENT, ABSENT]
+        yield (*cells, _PAPER_COLLISION)
+
+
+def edge_text(edge: Edge, instead: str) -> str:
+    """Return the text ``instead`` unless it is empty; otherwise return an edge with its bounds as text."""
+    return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
+
+
+def dwell_table(dwells: Sequence[DwellResult]) -> ReportTable:
+    """Return a table of Responses I and II of every dwell, measured and simulated."""
+    return ReportTable(
+        "Dwells: responses over the last seconds",
+        (
+            "dwell",
+            "A0 [µm]",
+            "Response I",
+            "noise bias of I",
+            "Response II",
+            "motion",
+            "simulated I",
+            "z of I",
+            "simulated II",
+            "z of II",
+            "impacts per s (sim.)",
+        ),
+        tuple(_dwell_row(each) for each in dwells),
+        "Response I: largest |x| in the window, over A0; in chaos, a random value. Response II:"
+        " component at the drive frequency, over A0. ± is the expanded uncertainty (k = 2); the table of"
+        " uncertainty shows its parts. Simulated: median and 95 % band of the draws from the recorded "
+        "voltage, or one run from the recorded base motion; z: standardised difference from the draws; "
+        "|z| exceeds 2.6 in one of 100 agreeing cases.",
+    )
+
+
+def _dwell_row(result: DwellResult) -> tuple[str, ...]:
+    found, overlay = result.analysis.response, result.overlay
+    plan = result.analysis.excitation
+    amplitude, first, second = budgets_of(result)
+    if np.isnan(found.noise_bias_i):
+        bias = "not determined"
+    else:
+        is_small = found.noise_bias_i < _SMALLEST_BIAS
+        bias = f"below {_SMALLEST_BIAS:g}" if is_small else f"{found.noise_bias_i:.1g}"
+    return (
+        f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz",
+        amplitude.text.removesuffix(f" {amplitude.unit}").strip("()"),
+        first.text,
+        bias,
+        second.text,
+        result.analysis.motion.verdict.text,
+        *_simulated_response(overlay, RESPONSE_I),
+        *_simulated_response(overlay, RESPONSE_II),
+        ABSENT if overlay is None else f"{overlay.run.impact_rate_hz:.0f}",
+    )
+
+
+def _simulated_response(overlay: DwellOverlay | None, name: str) -> tuple[str, str]:
+    """Return the simulated response with its 95 % band, and the z of the measured response."""
+    found = None if overlay is None else overlay.quantity(name)
+    if overlay is None or found is None:
+        return ABSENT, ABSENT
+    if overlay.run.draws == 1:
+        return f"{found.draws[0, 0]:.4g}", ABSENT
+    if not found.compared:
+        return "no draw has this motion", ABSENT
+    return f"{found.median[0]:.4g} ({found.lower[0]:.4g} to {found.upper[0]:.4g})", f"{found.z[0]:+.2f}"
+
+
+def _simulated_band(overlay: DwellOverlay, towards_hz: float) -> str:
+    """Return a band's median level over all draws [dB]; for one run or a low level, use the first draw."""
+    found = next((each for each in overlay.ensemble if each.frequency_hz[0] == towards_hz), None)
+    if found is None or not found.compared:
+        levels = [each.decibel for each in overlay.terminal if each.towards_hz == towards_hz]
+        return f"{levels[0]:.1f}" if levels else ABSENT
+    low, middle, high = (
+        f"{20 * np.log10(each[0]):.1f}" if each[0] > 0.0 else "nothing"
+        for each in (found.lower, found.median, found.upper)
+    )
+    return f"{middle} ({low} to {high}), z = {found.z[0]:+.1f}"
+
+
+def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
+    """Return a table of each dwell's motion at multiples of the drive frequency and in the terminal bands."""
+    rows = []
+    for each in dwells:
+        plan = each.analysis.excitation
+        name = f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz"
+        for line in each.analysis.response.lines:
+            if line.amplitude_m > 2 * line.sd_amplitude_m:
+                size = plus_minus(1e6 * line.amplitude_m, 2e6 * line.sd_amplitude_m)
+                place = f"{line.frequency_hz:.2f}"
+                rows.append((name, line.label, place, size, f"{line.decibel:.1f}", ABSENT))
+        for band in each.analysis.terminal:
+            what = f"band around {band.towards_hz:.0f} Hz"
+            place = f"{band.low_hz:.0f} to {band.high_hz:.0f}"
+            size = f"{plus_minus(1e6 * band.rms_m, 2e6 * band.rms_m * band.relative_sd)} rms"
+            simulated = ABSENT if each.overlay is None else _simulated_band(each.overlay, band.towards_hz)
+            rows.append((name, what, place, size, f"{band.decibel:.1f}", simulated))
+    return ReportTable(
+        "Dwells: spectral lines of the displacement, and bands at the terminal resonances",
+        ("dwell", "what", "frequency [Hz]", "displacement [µm]", "re drive line [dB]", "simulated [dB]"),
+        tuple(rows),
+        "Lines below two standard deviations are left out. Chaos fills bands, not lines: the level of a band "
+        "is its rms over the rms of the line at the drive frequency.",
+    )
+
+
 A = TypeVar("A", bound=AbstractAnalysis[Any, Any])
 L = TypeVar("L", bound=AbstractOverlay[Any])
 
@@ -201,12 +428,18 @@ class Drawing(Generic[A, L]):
 
 
 def _noise_figures(noise: NoiseResult) -> Iterator[DrawnFigure]:
+    # Load only the figures that a report shows.
+    from ._transmission import distortion_figure, transmission_figure  # noqa: PLC0415 - as above
+
     yield transmission_figure(noise.analysis, noise.overlay)
     if noise.analysis.response.periodic is not None:
         yield distortion_figure(noise.analysis, noise.analysis.response.periodic)
 
 
 def _noise_levels(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
+    from ..frequency_response.scan import scans_of  # noqa: PLC0415 - as above
+    from ._transmission import scan_figure, transmission_levels_figure  # noqa: PLC0415 - as above
+
     for scan in scans_of([each.analysis for each in noise]):
         yield scan_figure(scan)
     levels = [each.analysis for each in noise if each.analysis.facts.measurement.point is None]
@@ -215,6 +448,8 @@ def _noise_levels(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
 
 
 def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
+    from ._dwells import dwells_figure, portraits_figure  # noqa: PLC0415 - as above
+
     yield dwells_figure([(each.analysis, each.overlay) for each in dwells])
     yield portraits_figure([each.analysis for each in dwells])
 
@@ -227,16 +462,33 @@ def _dwell_levels(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
             yield from _dwell_figures(same)
 
 
-def _stepped_figures(look: SteppedLook[Any]) -> Callable[[SteppedSineResult], Iterator[DrawnFigure]]:
-    return lambda stepped: iter((stepped_sine_figure(stepped.analysis, stepped.overlay, look),))
+def _stepped_figures(stepped: SteppedSineResult) -> Iterator[DrawnFigure]:
+    from ._stepped_sine import STEPPED_FREQUENCIES, stepped_sine_figure  # noqa: PLC0415 - as above
+
+    yield stepped_sine_figure(stepped.analysis, stepped.overlay, STEPPED_FREQUENCIES)
+
+
+def _level_figures(level: SteppedSineResult) -> Iterator[DrawnFigure]:
+    from ._stepped_sine import STEPPED_LEVELS, stepped_sine_figure  # noqa: PLC0415 - as above
+
+    yield stepped_sine_figure(level.analysis, level.overlay, STEPPED_LEVELS)
+
+
+def _level_findings(level: SteppedSineResult) -> Iterator[str]:
+    from ._stepped_sine import stepped_level_caption  # noqa: PLC0415 - as above
+
+    yield stepped_level_caption(level.analysis.response)
 
 
 def _tracked_figures(tracked: SteppedSineResult) -> Iterator[DrawnFigure]:
     """Draw the tracked resonance over level if one was found, otherwise the stepped sine."""
+    from . import _stepped_sine as stepped_sine  # noqa: PLC0415 - as above
+
     if tracked_resonances(tracked.analysis.facts.feedback):
-        yield backbone_figure(tracked.analysis, tracked.overlay)
+        yield stepped_sine.backbone_figure(tracked.analysis, tracked.overlay)
     else:
-        yield stepped_sine_figure(tracked.analysis, tracked.overlay, TRACKED_RESONANCE)
+        look = stepped_sine.TRACKED_RESONANCE
+        yield stepped_sine.stepped_sine_figure(tracked.analysis, tracked.overlay, look)
 
 
 def _hysteresis_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
@@ -286,9 +538,7 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
         yield f"base amplitude A0, at {found.frequency_hz[top]:.4g} Hz", f"{amplitude} µm"
 
 
-STEPPED: Drawing[Any, Any] = Drawing(
-    _stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers
-)
+STEPPED: Drawing[Any, Any] = Drawing(_stepped_figures, stepped_findings, _stepped_numbers)
 """Presentation of stepped recordings; other packages may replace parts of it for their kind of excitation."""
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
@@ -314,11 +564,7 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
         Family.STEPPED: STEPPED,
     },
     {
-        "stepped_level": Drawing(
-            _stepped_figures(STEPPED_LEVELS),
-            lambda level: iter((stepped_level_caption(level.analysis.response),)),
-            _stepped_numbers,
-        ),
+        "stepped_level": Drawing(_level_figures, _level_findings, _stepped_numbers),
         "resonance_tracking": Drawing(
             _tracked_figures,
             lambda tracked: feedback_sentences(tracked.analysis.facts.feedback),

@@ -1,36 +1,176 @@
 """The report of a campaign, or of one recording, as one self-contained HTML file."""
 
+import base64
+import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
-from datetime import datetime, timedelta
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from enum import StrEnum
+from importlib.metadata import version
 from itertools import islice
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from vibench.sim import Parameter
-from vibench.sim.maps import MapResults
+from vibench.acquisition import printable
+from vibench.sim.operating_system.this import replace_file
 
-from ..comparison import CurveKind, CurveOrigin
-from ..dynamics import BranchDiagram, RecordedLevel, recorded_level, specimen_difference
 from ..errors import NotEnoughData
-from ..figures.dwells import verdict_text
-from ..figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
-from ..figures.maps import branches_figure, map_figure
-from ..figures.style import DrawnFigure
-from ..hidden_motion import HiddenMotion
-from ..kinds import ANALYSES, AnyResult, DwellResult, NoiseResult
+from ..kinds import AnyResult, DwellResult, NoiseResult
 from ..recordings.checks import Verdict
-from ..recordings.facts import RecordingFacts, known_specimen
+from ..recordings.facts import RecordingFacts
 from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
-from ..sine.stepped_response import SteppedResponse, lost_levels, tracked_resonances
-from ..sine.sweep import SweepResponse
-from ._drawings import DRAWINGS, figures_together, limits, recording_figures, result_sentence
-from ._page import Agreement, Card, Fold, Page, ReportTable, write_page
-from ._result_tables import nearest_resonance, uncertainty_table
+from ._drawings import (
+    DRAWINGS,
+    ReportTable,
+    figures_together,
+    limits,
+    nearest_resonance,
+    recording_figures,
+    result_sentence,
+    uncertainty_table,
+)
+from ._style import DrawnFigure
+
+if TYPE_CHECKING:
+    from vibench.sim.maps import MapResults
+
+    from ..dynamics import BranchDiagram
+    from ..hidden_motion import HiddenMotion
+
+Rows = tuple[tuple[str, str], ...]
+LONGEST_CAPTION = 225
+"""Maximum number of characters of title and caption together: three lines of a figure's column."""
+MOST_OPEN_CARDS = 12
+"""Maximum number of cards shown unfolded, which keeps the page short."""
+_LARGEST_SVG_BYTES = 300_000
+"""Largest embedded SVG; above this size, a PNG is smaller, faster to show and equally legible."""
+_SENTENCE_ENDS = re.compile(r"(?<=\.)(?<!\bal\.)(?<!\bFig\.)\s+(?=[A-Z0-9])")
+
+
+class Agreement(StrEnum):
+    """Whether a simulation, or a claim, agrees with the measurement."""
+
+    YES = "yes"
+    NO = "no"
+    OPEN = "cannot tell"
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Folded part of a page: sentences, tables and figures below a heading."""
+
+    title: str
+    sentences: tuple[str, ...] = ()
+    tables: tuple[ReportTable, ...] = ()
+    figures: tuple[DrawnFigure, ...] = ()
+
+
+@dataclass(frozen=True)
+class Card:
+    """Card of one recording or of one group of claims, and its row in the overview table."""
+
+    name: str
+    result: str
+    """Result of the recording or of the group of claims in one sentence."""
+    agreement: Agreement
+    look_at: str
+    """Warnings to read before the result is used."""
+    numbers: Rows = ()
+    """Up to three quantities: name, and value with bounds."""
+    warnings: tuple[str, ...] = ()
+    figure: DrawnFigure | None = None
+    folds: tuple[Fold, ...] = ()
+
+
+@dataclass(frozen=True)
+class Page:
+    """Content of a report, in the order of its fields."""
+
+    title: str
+    about: str
+    """Subject of the report, shown next to date and version."""
+    warnings: tuple[str, ...]
+    """Warnings that change a conclusion."""
+    findings: str
+    """Summary of at most 120 words."""
+    figure: DrawnFigure | None
+    noun: str
+    """Noun for the rows of the overview table, such as recording or claims."""
+    cards: tuple[Card, ...]
+    further: Fold
+    """Unfolded part: common figures of several recordings, and sentences on the model."""
+    folds: tuple[Fold, ...]
+    limits: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _EmbeddedFigure:
+    number: int
+    source: str
+    """A ``data:`` address that contains the whole image."""
+    caption: str
+    rest: str
+    """Further sentences of the caption, which are folded."""
+
+
+def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Path:
+    """Write one HTML file with all figures inside; an older file of that name is replaced.
+
+    Parameters
+    ----------
+    figures_folder
+        Folder for PNG, SVG and CSV of each figure; nothing is saved if None.
+    """
+    figures = list(dict.fromkeys(_figures(page)))
+    environment = Environment(
+        loader=PackageLoader("vibench.analysis.report", "."),
+        autoescape=True,
+        # Escape control characters in names and texts; Markup from the template stays unchanged.
+        finalize=lambda content: printable(content) if type(content) is str else content,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    text = environment.get_template("report.html.j2").render(
+        page=page,
+        embedded={each: _embed(number, each, figures_folder) for number, each in enumerate(figures, 1)},
+        is_long=len(page.cards) > MOST_OPEN_CARDS,
+        written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        version=version("vibench"),
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with replace_file(path) as coming:
+        coming.write_text(text, encoding="utf-8")
+    return path
+
+
+def _figures(page: Page) -> Iterator[DrawnFigure]:
+    """Yield all figures in the order of their numbers: unfolded figures first, then figures in folds."""
+    yield from (each for each in (page.figure, *(card.figure for card in page.cards)) if each is not None)
+    yield from page.further.figures
+    for fold in (*(fold for card in page.cards for fold in card.folds), *page.folds):
+        yield from fold.figures
+
+
+def _embed(number: int, drawn: DrawnFigure, folder: Path | None) -> _EmbeddedFigure:
+    if folder is not None:
+        drawn.save(folder)
+    svg = drawn.svg
+    kind, content = ("svg+xml", svg) if len(svg) <= _LARGEST_SVG_BYTES else ("png", drawn.png)
+    source = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
+    return _EmbeddedFigure(number, source, *split_caption(drawn))
+
+
+def split_caption(drawn: DrawnFigure) -> tuple[str, str]:
+    """Split a caption into its first sentences, which fill at most three lines, and the rest."""
+    sentences = _SENTENCE_ENDS.split(drawn.caption)
+    lengths = [len(drawn.title) + len(" ".join(sentences[:end])) for end in range(len(sentences) + 1)]
+    fitting = sum(each <= LONGEST_CAPTION for each in lengths) - 1
+    return " ".join(sentences[:fitting]), " ".join(sentences[fitting:])
+
 
 MOST_WORDS = 120
 _NUMBERS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
@@ -110,7 +250,7 @@ def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
     by_place: dict[float, dict[str, list[str]]] = {}
     for each in dwells:
         kinds = by_place.setdefault(each.analysis.excitation.frequency_hz, {})
-        levels = kinds.setdefault(verdict_text(each.analysis.motion.verdict), [])
+        levels = kinds.setdefault(each.analysis.motion.verdict.text, [])
         levels.append(f"{each.analysis.excitation.amplitude_vpp:g}")
     for frequency_hz, kinds in by_place.items():
         texts = [f"{kind} at {_join(list(dict.fromkeys(levels)))} Vpp" for kind, levels in kinds.items()]
@@ -163,89 +303,6 @@ def _number(count: int) -> str:
 
 def _count(count: int, noun: str) -> str:
     return f"{_number(count)} {noun}{'' if count == 1 else 's'}"
-
-
-def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
-    """Draw each map, overlaid with levels and Response I of stepped sines and sweeps."""
-    levels = _recorded_levels(results, CurveKind.RESPONSE_I)
-    for number, found in enumerate(maps, start=1):
-        drawn = map_figure(found, levels=levels if found.plan.is_over_drive else ())
-        yield replace(drawn, name=f"map_{number}")
-
-
-def _recorded_levels(results: CampaignResults, *kinds: CurveKind) -> list[RecordedLevel]:
-    """Return level, responses and specimen of each stepped sine and sweep over a range of frequencies."""
-    levels = []
-    for each in results.in_order:
-        facts, found = each.analysis.facts, each.analysis.response
-        if isinstance(found, SweepResponse | SteppedResponse):
-            with suppress(NotEnoughData):
-                level = recorded_level(found.frequency_hz, found.drive_amplitude_m)
-                measured = ANALYSES[each.kind].curves(facts.name, CurveOrigin.MEASURED, found)
-                shown = [curve for curve in measured if not kinds or curve.response in kinds]
-                levels.append(RecordedLevel(facts.name, level, shown, known_specimen(facts.bench)))
-    return levels
-
-
-def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
-    """Draw each branch diagram; diagrams over frequency also show results of stepped sines and sweeps."""
-    levels = _recorded_levels(results)
-    for number, diagram in enumerate(diagrams, start=1):
-        if diagram.request.resonance_band_hz is not None:
-            drawn = _backbones(results, diagram)
-        elif diagram.request.along is not Parameter.FREQUENCY:
-            drawn = branches_figure(diagram)
-        else:
-            drawn = branches_figure(diagram, [curve for level in levels for curve in level.measured])
-            sentences = (_level_sentence(diagram, each) for each in levels)
-            drawn = replace(drawn, caption=" ".join((drawn.caption, *sentences)))
-        yield replace(drawn, name=f"branches_{number}")
-
-
-def _backbones(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
-    """Draw a computed phase resonance with the tracked resonances near it."""
-    low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
-    facts = [each.analysis.facts for each in results.in_order]
-    bands = [each.measurement.excitation.band_hz for each in facts]
-    near = [each for each, band in zip(facts, bands, strict=True) if band[0] < high_hz and low_hz < band[1]]
-    drawn = branches_figure(
-        diagram, tracked=[track for each in near for track in tracked_resonances(each.feedback)]
-    )
-    sentences = [_lost_sentence(diagram, level) for each in near for level in lost_levels(each.feedback)]
-    for each in near:
-        recorded = known_specimen(each.bench)
-        sentences.append(specimen_difference(diagram.request.chosen_specimen, recorded, each.name))
-    return replace(drawn, caption=" ".join(filter(None, (drawn.caption, *sentences))))
-
-
-def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """State the model's largest Floquet multipliers at a level without resonance, or that there are none."""
-    sizes: list[float] = []
-    for line in diagram.lines:
-        above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
-        sizes += line.largest_multiplier[1:][above[1:] != above[:-1]].tolist()
-    text = f"At {level_m_per_s2:g} m/s² the control did not lock onto a periodic motion;"
-    if not sizes:
-        return f"{text} the branches contain no periodic motion at this level."
-    multipliers = ", ".join(f"{each:.3g}" for each in sizes)
-    return f"{text} the largest Floquet multiplier of the modelled motion is {multipliers}."
-
-
-def _level_sentence(diagram: BranchDiagram, level: RecordedLevel) -> str:
-    """State how base amplitude and specimen of a recording differ from those of the branches."""
-    request = diagram.request
-    ratios = [
-        amplitude / request.path.drive(frequency)[1]
-        for frequency, amplitude in level.pairs
-        if request.start <= frequency <= request.stop
-    ]
-    name, difference = level.name, level.difference(request.chosen_specimen)
-    if not ratios:
-        text = f"The drive of {name} was outside the frequency range of the branches."
-    else:
-        low, high = np.min(ratios), np.max(ratios)
-        text = f"The base amplitude of {name} is {low:.2g} to {high:.2g} times the amplitude of the branches."
-    return f"{text} {difference}".rstrip()
 
 
 def measured_table(facts: RecordingFacts) -> ReportTable:
@@ -367,9 +424,9 @@ def write_report(
     results: CampaignResults,
     path: Path,
     figures_folder: Path | None = None,
-    diagrams: Sequence[BranchDiagram] = (),
-    hidden: Sequence[HiddenMotion] = (),
-    maps: Sequence[MapResults] = (),
+    diagrams: "Sequence[BranchDiagram]" = (),
+    hidden: "Sequence[HiddenMotion]" = (),
+    maps: "Sequence[MapResults]" = (),
     drawn: Mapping[AnyResult, Card] = MappingProxyType({}),
 ) -> Path:
     """Write one HTML file with all figures; replace an older report of the same name.
@@ -396,8 +453,11 @@ def write_report(
     if not results.results and not results.failures:
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
     cards = [drawn.get(each) or _card(each, results) for each in results.in_order]
-    together = [*figures_together(results), *draw_branches(results, diagrams), *draw_maps(results, maps)]
-    together += [draw(each) for each in hidden for draw in (hidden_motion_figure, hidden_impacts_figure)]
+    together = [*figures_together(results)]
+    if diagrams or maps or hidden:
+        from ._maps import model_figures  # noqa: PLC0415 - few reports need the code of these models
+
+        together += model_figures(results, diagrams, maps, hidden)
     first = together.pop(0) if len(cards) > 1 and together else next((each.figure for each in cards), None)
     page = Page(
         title=results.name,

@@ -5,21 +5,22 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import ValidationError
+from pydantic import Field, PositiveFloat, ValidationError, model_validator
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import Recording, UntilNote, copy_sentence, first_copies
 from vibench.acquisition.rig import Rig
-from vibench.sim import Specimen
+from vibench.sim import FrozenModel, Specimen
 from vibench.sim.background import Observer, Progress, ignore_progress, stage
 
 from ..errors import AnalysisError, NotEnoughData, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST, NoiseAnalysis
-from ..frequency_response.results import FrequencyResponseRequest
+from ..frequency_response.results import Estimator, FrequencyResponseRequest
 from ..kinds import (
     ANALYSES,
+    FAMILIES,
     NOISE_FAMILY,
     AnyResult,
     DwellResult,
@@ -35,11 +36,46 @@ from ..overlay.overlay import AbstractOverlay, Simulation
 from ..recordings.channels import RecordedChannels, force_roles, response_role, response_roles, scanned_role
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..recordings.facts import RecordingFacts, recording_facts, require_moving_channels, specimen_of
+from ..signals import DEFAULT_CONFIDENCE, Window
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import plain
 from ..uncertainty.budget import Budget
 from ..uncertainty.expected import expected_recorded_s
+
+
+class AnalysisOptions(FrozenModel):
+    """Options of an analysis; the options from estimator to confidence apply to noise only."""
+
+    model: Simulation = Simulation.LEFT_OUT
+    """Simulation to overlay: rig and specimen driven by the recorded voltage (the twin), or the specimen
+    alone driven by the recorded base motion. A simulation takes seconds to minutes per recording."""
+    estimator: Estimator = Estimator.DRIVE
+    """Estimator: noise on the base biases 'h1', noise on the response biases 'h2', neither biases 'drive'."""
+    noise_ratio: float | None = Field(default=None, ge=0.0)
+    """For hv only: ratio of the noise densities of m0's velocity and the base acceleration, in s²."""
+    window: Window = Window.HANN
+    """Window of the segments of streamed noise."""
+    resolution_hz: PositiveFloat | None = None
+    """Resolution for streamed noise; automatic by default. Give either resolution or averages."""
+    averages: Annotated[float, Field(gt=1.0)] | None = None
+    """Number of independent averages of streamed noise; automatic by default."""
+    overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
+    """Overlap of neighbouring segments, as a fraction of their length."""
+    confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
+    """Probability that the bounds at a spectral line contain the true value."""
+
+    @model_validator(mode="after")
+    def _is_allowed(self) -> Self:
+        """Refuse invalid combinations of options: building the noise request raises an error for them."""
+        self.request  # noqa: B018 - making it is the check
+        return self
+
+    @property
+    def request(self) -> FrequencyResponseRequest:
+        """Noise analysis requested by these options."""
+        return FrequencyResponseRequest(**self.model_dump(exclude={"model"}))
+
 
 CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
 """Errors that calculations raise if the parts of a well-formed recording contradict each other."""
@@ -209,11 +245,12 @@ class CampaignResults:
     @property
     def in_order(self) -> tuple[AnyResult, ...]:
         """Results sorted by kind; within one kind, from weak to strong or in the order given."""
-        families = tuple(dict.fromkeys(row.family for row in ANALYSES.values()))
+        kinds = tuple(ANALYSES)
 
         def place(each: AnyResult) -> tuple[float, ...]:
             row = ANALYSES[each.kind]
-            return families.index(row.family), *row.place(each.analysis.excitation)
+            family = FAMILIES.index(row.family) if row.family in FAMILIES else kinds.index(each.kind)
+            return row.family not in FAMILIES, family, *row.place(each.analysis.excitation)
 
         return tuple(sorted(self.results, key=place))
 

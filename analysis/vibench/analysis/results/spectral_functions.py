@@ -17,8 +17,7 @@ from ..frequency_response.results import FrequencyResponseRequest
 from ..frequency_response.scan import scans_of
 from ..kinds import NOISE_FAMILY, family_of
 from ..recordings.facts import require_checked
-from ..signals.averaging import hop_samples
-from ..signals.quantity import Quantity
+from ..signals import Quantity, hop_samples
 from ..spectra import DensitySums
 from .campaign_results import analyse
 

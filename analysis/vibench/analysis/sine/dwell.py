@@ -12,10 +12,17 @@ from vibench.acquisition.recording import SegmentLabel
 from ..chaos.verdict import LARGEST_NOISE, SMALL, STEADY
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import RecordedChannels, far_from
-from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.averaging import standard_uncertainty
-from ..signals.interpolation import sizes_with_maxima
-from ..signals.quantity import ConvertedSignal, Quantity, converted_signal, disturbed_samples
+from ..signals import (
+    Complexes,
+    ConvertedSignal,
+    Flags,
+    Quantity,
+    Reals,
+    converted_signal,
+    disturbed_samples,
+    sizes_with_maxima,
+    standard_uncertainty,
+)
 from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
 from ..tables import Tabular
 from ..tones import (

@@ -22,9 +22,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..recordings.channels import RecordedChannels, only_stretch, read_whole
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..recordings.facts import RecordingFacts, specimen_of
-from ..signals.arrays import Envelope, Flags, Reals, envelope
-from ..signals.interpolation import REACH, interpolate
-from ..signals.quantity import Quantity, converted_signal
+from ..signals import REACH, Envelope, Flags, Quantity, Reals, converted_signal, envelope, interpolate
 from ..spectra import spectral_density
 from ..tables import Tabular
 from ..tones import fit_sine, largest_peak

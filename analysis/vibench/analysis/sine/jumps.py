@@ -8,7 +8,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from ..errors import InvalidRequest
-from ..signals.arrays import PER_NEPER_DB, Flags, Reals
+from ..signals import PER_NEPER_DB, Flags, Reals
 from ..tables import Tabular
 from .stepped_response import SteppedResponse, SteppedSineAnalysis
 from .sweep import SweepResponse

@@ -33,8 +33,7 @@ from vibench.acquisition.recording import (
 from ..errors import NotEnoughData
 from ..recordings.channels import RecordedChannels, Stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
-from ..signals.arrays import Integers, Reals
-from ..signals.quantity import steady_line
+from ..signals import Integers, Reals, steady_line
 from ..tables import Tabular, columns, plus_minus
 from ..tones import fit_sine
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before

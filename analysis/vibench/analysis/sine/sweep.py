@@ -14,9 +14,16 @@ from scipy import fft
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import far_from
-from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.interpolation import Decimator, decimation_factor
-from ..signals.quantity import Quantity, converted_signal, disturbed_samples
+from ..signals import (
+    Complexes,
+    Decimator,
+    Flags,
+    Quantity,
+    Reals,
+    converted_signal,
+    decimation_factor,
+    disturbed_samples,
+)
 from ..tables import Tabular
 from ..tones import (
     ALL_ORDERS,

@@ -14,7 +14,7 @@ from vibench.sim import Specimen, base_transmissibility
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import RecordedChannels, only_stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
-from ..signals.arrays import Flags, Reals, runs_of
+from ..signals import Flags, Reals, runs_of
 from ..spectra import Spectrogram, SpectrogramSums
 from ..tables import Tabular
 from .dwell import LEAST_CLEAR

@@ -14,7 +14,7 @@ from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOverlay
 from ..recordings.channels import BASE, described_sensor
 from ..recordings.facts import RecordingFacts
-from ..signals.arrays import Flags, Reals
+from ..signals import Flags, Reals
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import BURST, DwellAnalysis
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis

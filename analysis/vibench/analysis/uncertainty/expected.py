@@ -36,9 +36,7 @@ from ..errors import AnalysisError, InvalidRequest
 from ..frequency_response.resonance import resonances
 from ..frequency_response.results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II
-from ..signals.arrays import Reals
-from ..signals.averaging import Window
-from ..signals.quantity import Quantity
+from ..signals import Quantity, Reals, Window
 from ..sine.dwell import DwellResponse, dwell_response
 from ..tables import Tabular
 from .budget import (

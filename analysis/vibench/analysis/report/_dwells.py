@@ -7,22 +7,14 @@ from matplotlib.axes import Axes
 
 from vibench.sim import Specimen
 
-from ..chaos.verdict import MotionKind, MotionVerdict
+from ..chaos.verdict import MotionKind
 from ..overlay.overlay import SPECTRUM, DwellOverlay
 from ..recordings.facts import specimen_of
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import COLUMN_HZ, DwellAnalysis, spectrum_columns
 from ..tables import Table, columns, plus_minus, table
-from . import style
-from .ensemble_band import (
-    band_columns,
-    draw_band,
-    label_resonances,
-    mark_resonances,
-    run_text,
-    simulated_label,
-)
+from . import _style as style
 
 _PANEL_IN = 2.9
 _COLUMNS = 3
@@ -57,15 +49,6 @@ def portraits_figure(analyses: Sequence[DwellAnalysis]) -> style.DrawnFigure:
     )
 
 
-def verdict_text(verdict: MotionVerdict) -> str:
-    """Return the kind of motion in a dwell, in a few words."""
-    match verdict:
-        case MotionVerdict(kind=MotionKind.PERIODIC, period=period) if period is not None and period > 1:
-            return f"periodic, {period} drive periods"
-        case _:
-            return verdict.kind.value
-
-
 def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
     section = analysis.motion.section
     length, unit = style.with_prefix(float(np.max(np.abs(section.orbit_displacement_m))), "m")
@@ -80,7 +63,7 @@ def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
     axes.set(
         xlabel=f"x of {analysis.facts.mass} [{unit}]",
         ylabel=f"velocity of {analysis.facts.mass} [{speed_unit}]",
-        title=f"{analysis.excitation.amplitude_vpp:g} Vpp: {verdict_text(analysis.motion.verdict)}",
+        title=f"{analysis.excitation.amplitude_vpp:g} Vpp: {analysis.motion.verdict.text}",
     )
 
 
@@ -88,7 +71,7 @@ def _caption(rising: Sequence[DwellAnalysis]) -> str:
     sentences = []
     for each in rising:
         verdict = each.motion.verdict
-        text = f"{each.excitation.amplitude_vpp:g} Vpp: {verdict_text(verdict)} ({verdict.why})"
+        text = f"{each.excitation.amplitude_vpp:g} Vpp: {verdict.text} ({verdict.why})"
         if verdict.least_exponent_per_s is not None:
             text += f", largest exponent at least {verdict.least_exponent_per_s:.3g} per second"
         sentences.append(text)
@@ -120,7 +103,7 @@ def dwells_figure(pairs: Sequence[Pair]) -> style.DrawnFigure:
             axes.set_xlabel(label)
         panels[0, 0].set_title("whole dwell")
         panels[0, 1].set_title(f"last {_ZOOM_PERIODS:g} periods")
-        label_resonances(panels[0, 2], at, without_contact=False)
+        style.label_resonances(panels[0, 2], at, without_contact=False)
         style.legend_above(figure, [panels[0, 1], panels[0, 0], panels[0, 2]], columns=3)
         figure.align_ylabels(panels[:, 0])
     return style.DrawnFigure(
@@ -159,16 +142,16 @@ def _zoom(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None) -> 
     axes.plot(1e3 * time_s, factor * motion, color=style.MEASURED, linewidth=1.2, label="measured")
     if overlay is not None:
         simulated = factor * last_periods(overlay.response)[1]
-        axes.plot(1e3 * time_s, simulated, label=simulated_label(overlay.run), **style.SIMULATED_CURVE)
+        axes.plot(1e3 * time_s, simulated, label=style.simulated_label(overlay.run), **style.SIMULATED_CURVE)
     axes.set(xlim=(1e3 * float(time_s[0]), 0), ylabel=f"x [{unit}]")
 
 
 def _spectrum(axes: Axes, response: DwellResponse, overlay: DwellOverlay | None, at: Specimen) -> None:
-    mark_resonances(axes, at, without_contact=False)
+    style.mark_resonances(axes, at, without_contact=False)
     frequency_hz, size = spectrum_columns(response)
     axes.plot(frequency_hz, size, color=style.MEASURED, linewidth=1.0)
     if overlay is not None:
-        middle = draw_band(axes, frequency_hz, overlay, SPECTRUM)
+        middle = style.draw_band(axes, frequency_hz, overlay, SPECTRUM)
         curve = spectrum_columns(overlay.response) if middle is None else (frequency_hz, middle)
         axes.plot(*curve, color=style.SIMULATED, linewidth=0.6, zorder=3)
     style.magnitude_axis(axes)
@@ -187,7 +170,7 @@ def dwells_caption(rising: Sequence[Pair]) -> str:
             f"{plus_minus(found.response_ii, 2 * found.sd_response_ii)}"
         )
         if overlay is not None:
-            text += f". {run_text(overlay)}"
+            text += f". {style.run_text(overlay)}"
         bands = ", ".join(
             f"{each.decibel:.1f} dB around {each.towards_hz:.0f} Hz" for each in analysis.terminal
         )
@@ -213,7 +196,7 @@ def _tables(pair: Pair) -> tuple[Table, ...]:
     spectrum = {"frequency_hz": frequency_hz, "amplitude_over_a0": size}
     signal = {"time_s": time_s, "displacement_m": motion}
     if overlay is not None:
-        spectrum |= band_columns(overlay, SPECTRUM, "amplitude_over_a0")
+        spectrum |= style.band_columns(overlay, SPECTRUM, "amplitude_over_a0")
         spectrum["amplitude_over_a0_simulated"] = spectrum_columns(overlay.response)[1]
         signal["displacement_simulated_m"] = last_periods(overlay.response)[1]
     whole = analysis.displacement

@@ -11,9 +11,9 @@ from vibench.sim import Parameter, PowerLaw, RigidStops, Specimen, spring_of
 from vibench.sim.accuracy_benchmark import CurvePoint
 
 from ..dynamics import ExponentSpectrum
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import Table, rows, table
-from . import style
+from . import _style as style
 
 _LEAST = 1e-14
 """Smallest error drawn; smaller errors are due to rounding."""

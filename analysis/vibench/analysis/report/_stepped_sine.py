@@ -17,7 +17,7 @@ from vibench.acquisition.plan import (
 )
 
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
-from ..signals.arrays import Flags, Reals
+from ..signals import Flags, Reals
 from ..sine.jumps import hysteresis_vpp, level_jumps
 from ..sine.stepped_response import (
     SteppedResponse,
@@ -30,15 +30,7 @@ from ..sine.stepped_response import (
     tracked_resonances,
 )
 from ..tables import columns, plus_minus, rows, table
-from . import style
-from .ensemble_band import (
-    ATTRIBUTES,
-    RESPONSE_LABELS,
-    draw_sines,
-    run_text,
-    simulated_label,
-    simulated_responses,
-)
+from . import _style as style
 
 _HEIGHT_IN = 4.6
 _MARKERS = {"up": "^", "down": "v"}
@@ -76,13 +68,13 @@ def stepped_sine_figure(
         "phase_rad",
     )
     if overlay is not None:
-        content |= simulated_responses(overlay)
+        content |= style.simulated_responses(overlay)
     name = f"stepped_sine_{analysis.facts.name}"
     caption = [look.caption(analysis.excitation, found), *feedback_sentences(analysis.facts.feedback)]
     return style.DrawnFigure(
         name=name,
         title=look.title(analysis.excitation, found),
-        caption=" ".join(caption if overlay is None else [*caption, run_text(overlay)]),
+        caption=" ".join(caption if overlay is None else [*caption, style.run_text(overlay)]),
         figure=figure,
         tables=(table(name, **content),),
     )
@@ -91,9 +83,9 @@ def stepped_sine_figure(
 def _responses(
     axes: Axes, along: Reals, analysis: SteppedSineAnalysis, overlay: SteppedSineOverlay | None, what: str
 ) -> None:
-    found, attribute = analysis.response, ATTRIBUTES[what]
+    found, attribute = analysis.response, style.ATTRIBUTES[what]
     if overlay is not None:
-        draw_sines(axes, along, overlay.prediction, what, "steady sines from rest")
+        style.draw_sines(axes, along, overlay.prediction, what, "steady sines from rest")
     for direction in sorted(set(found.direction)):
         chosen = np.array([each == direction for each in found.direction])
         marker = _MARKERS.get(direction, "o")
@@ -104,20 +96,20 @@ def _responses(
     for low_hz, high_hz, _ in noted_jumps(analysis.facts.feedback):
         axes.axvspan(low_hz, high_hz, color=style.MEASURED, alpha=0.3)
     style.magnitude_axis(axes)
-    axes.set_ylabel(RESPONSE_LABELS[what])
+    axes.set_ylabel(style.RESPONSE_LABELS[what])
 
 
 def _draw_simulated(
     axes: Axes, along: Reals, chosen: Flags, overlay: SteppedSineOverlay, what: str, look: tuple[str, str]
 ) -> None:
     """Draw the median of simulated runs at each step in one direction, with the 95 % band as error bars."""
-    values, reach = getattr(overlay.response, ATTRIBUTES[what])[chosen], None
+    values, reach = getattr(overlay.response, style.ATTRIBUTES[what])[chosen], None
     found = overlay.quantity(what)
     if found is not None and overlay.run.draws > 1:
         values = found.median[chosen]
         reach = np.clip([values - found.lower[chosen], found.upper[chosen] - values], 0.0, None)
     marker, direction = look
-    label = f"{simulated_label(overlay.run)}, {direction}"
+    label = f"{style.simulated_label(overlay.run)}, {direction}"
     empty: dict[str, Any] = {"markerfacecolor": "none", "elinewidth": 0.8, "capsize": 1.5}
     axes.errorbar(along[chosen], values, reach, fmt=marker, color=style.SIMULATED, label=label, **empty)
 

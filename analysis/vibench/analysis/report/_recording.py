@@ -5,9 +5,9 @@ import numpy as np
 from vibench.acquisition.plan import Measurement, SignalPreview
 
 from ..recordings.facts import RecordingFacts
-from ..signals.arrays import Reals, envelope
+from ..signals import Reals, envelope
 from ..tables import table
-from . import style
+from . import _style as style
 
 _ROW_IN = 0.85
 _FRAME_IN = 0.6

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..dynamics import ChainAnswer, ChainDrive, ChainRun
 from ..tables import Table, rows, table
-from . import style
+from . import _style as style
 
 _WAVES_IN, _RUNS_IN = 4.2, 9.0
 """Height [inches] of the figure without runs and with runs."""

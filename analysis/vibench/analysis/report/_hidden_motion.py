@@ -4,9 +4,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..hidden_motion import Hidden, HiddenMotion, measured_gaps
-from ..signals.arrays import envelope
+from ..signals import envelope
 from ..tables import Table, columns, table
-from . import style
+from . import _style as style
 
 _MICRO = 1e6
 _COLUMNS = 1200

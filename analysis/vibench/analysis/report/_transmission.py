@@ -19,18 +19,9 @@ from ..frequency_response.results import MagnitudeScale
 from ..frequency_response.scan import Scan
 from ..overlay.overlay import TRANSMISSION, NoiseOverlay
 from ..recordings.facts import specimen_of
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..tables import Table, columns, plus_minus, table
-from . import style
-from .ensemble_band import (
-    band_columns,
-    draw_band,
-    label_resonances,
-    mark_resonances,
-    run_text,
-    simulated_label,
-    sines_table,
-)
+from . import _style as style
 
 _HEIGHT_IN = 6.4
 _LARGEST_BOUND_RATIO = 10.0
@@ -59,7 +50,7 @@ def transmission_figure(analysis: NoiseAnalysis, overlay: NoiseOverlay | None = 
         panels[-1, 0].set_xlabel("frequency [Hz]")
         found = analysis.response.frequency_response.frequency_hz
         style.frequency_axis(top, float(found[0]), float(found[-1]))
-        label_resonances(top, at)
+        style.label_resonances(top, at)
         style.legend_above(figure, [top], columns=2)
         figure.align_ylabels()
     return style.DrawnFigure(
@@ -77,7 +68,7 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | Non
     size = measured.magnitude
     low = np.maximum(measured.magnitude_lower, size / _LARGEST_BOUND_RATIO)
     high = np.minimum(measured.magnitude_upper, size * _LARGEST_BOUND_RATIO)
-    mark_resonances(axes, at)
+    style.mark_resonances(axes, at)
     bounds = f"{100 * measured.settings.confidence:g} % bounds"
     axes.fill_between(
         measured.frequency_hz, view.place(low), view.place(high), color=style.BOUNDS, alpha=0.45, label=bounds
@@ -93,11 +84,13 @@ def _magnitudes(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | Non
         label = f"Response I, sines of A0 = {micrometres:.3g} µm"
         axes.plot(sines.frequency_hz, response_i, color=style.PREDICTED, linewidth=0.9, label=label)
         factor = view.factor(simulated.frequency_hz)
-        middle = draw_band(
+        middle = style.draw_band(
             axes, simulated.frequency_hz, overlay, TRANSMISSION, lambda values: view.place(values * factor)
         )
         curve = view.place(simulated.magnitude) if middle is None else middle
-        axes.plot(simulated.frequency_hz, curve, label=simulated_label(overlay.run), **style.SIMULATED_CURVE)
+        axes.plot(
+            simulated.frequency_hz, curve, label=style.simulated_label(overlay.run), **style.SIMULATED_CURVE
+        )
     axes.plot(measured.frequency_hz, view.place(size), color=style.MEASURED, label="measured", zorder=3)
     peaks = analysis.response.resonances
     peaks_hz = np.array([each.peak_frequency_hz for each in peaks])
@@ -116,7 +109,7 @@ def _phases(axes: Axes, analysis: NoiseAnalysis, overlay: NoiseOverlay | None, a
     """Draw the phase from -180 to 180 degrees, with bounds where these are narrower than a full turn."""
     view = analysis.view
     measured = view.apply(analysis.response.frequency_response)
-    mark_resonances(axes, at)
+    style.mark_resonances(axes, at)
     low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
     axes.fill_between(measured.frequency_hz, low, high, color=style.BOUNDS, alpha=0.45)
     if overlay is not None:
@@ -141,14 +134,14 @@ def _cut_wrap(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
 
 def _coherence(axes: Axes, analysis: NoiseAnalysis, at: Specimen) -> None:
     measured = analysis.response.frequency_response
-    mark_resonances(axes, at)
+    style.mark_resonances(axes, at)
     axes.plot(measured.frequency_hz, measured.coherence, color=style.MEASURED, linewidth=0.8)
     axes.axhline(measured.coherence_significance, color=style.SIMULATED, linewidth=0.9, linestyle="-.")
     axes.set(ylim=(0, 1.05), ylabel="coherence")
 
 
 def _differences(axes: Axes, overlay: NoiseOverlay, at: Specimen) -> None:
-    mark_resonances(axes, at)
+    style.mark_resonances(axes, at)
     shown = np.clip(overlay.difference.decibel, -_DIFFERENCE_LIMIT_DB, _DIFFERENCE_LIMIT_DB)
     axes.plot(overlay.difference.frequency_hz, shown, color=style.SIMULATED, linewidth=0.8)
     axes.axhline(0, color=style.MEASURED, linewidth=0.6)
@@ -182,7 +175,7 @@ def transmission_caption(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) 
     ]
     if overlay is not None:
         sentences.append(
-            f"{run_text(overlay)} Median difference {overlay.difference.median_abs_db:.2g} dB. "
+            f"{style.run_text(overlay)} Median difference {overlay.difference.median_abs_db:.2g} dB. "
             f"The blue curve is the predicted Response I to sines instead of noise "
             f"({overlay.amplitude_basis}); this curve is not fitted."
         )
@@ -229,10 +222,10 @@ def _tables(analysis: NoiseAnalysis, overlay: NoiseOverlay | None) -> tuple[Tabl
     found["magnitude_h2"] = view.apply(analysis.response.h2).magnitude
     if overlay is None:
         return (table(name, **found),)
-    found |= band_columns(overlay, TRANSMISSION, "transmission")
+    found |= style.band_columns(overlay, TRANSMISSION, "transmission")
     found["magnitude_simulated"] = view.apply(overlay.response.frequency_response).magnitude
     found |= columns(overlay.difference, "difference_db=decibel difference_standard_errors=standard_errors")
-    return table(name, **found), sines_table(name, overlay.prediction)
+    return table(name, **found), style.sines_table(name, overlay.prediction)
 
 
 _SCAN_HEIGHT_IN = 4.6
@@ -423,7 +416,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
     at = specimen_of(rising[0].facts.bench)
     with style.drawing(_LEVELS_HEIGHT_IN) as figure:
         axes = figure.subplots()
-        mark_resonances(axes, at)
+        style.mark_resonances(axes, at)
         for number, each in enumerate(rising):
             found = view.apply(each.response.frequency_response)
             level = each.response.base_level.rms_acceleration
@@ -438,7 +431,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> style.Drawn
         lows = [float(each.response.frequency_response.frequency_hz[0]) for each in rising]
         highs = [float(each.response.frequency_response.frequency_hz[-1]) for each in rising]
         style.frequency_axis(axes, min(lows), max(highs))
-        label_resonances(axes, at)
+        style.label_resonances(axes, at)
         style.legend_above(figure, [axes], columns=2)
     columns = {}
     for each in rising:

@@ -6,23 +6,13 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SweepOverlay
-from ..signals.arrays import Reals
+from ..signals import Reals
 from ..sine.jumps import Jump, hysteresis
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import Collisions, SweepAnalysis
 from ..tables import Table, columns, plus_minus, table
 from ..tones import order_label
-from . import style
-from .ensemble_band import (
-    ATTRIBUTES,
-    RESPONSE_LABELS,
-    draw_band,
-    draw_sines,
-    run_text,
-    simulated_label,
-    simulated_responses,
-    sines_table,
-)
+from . import _style as style
 
 _HEIGHT_IN = 6.4
 
@@ -57,7 +47,7 @@ def _envelope(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None)
     low, high, label = factor * found.lower, factor * found.upper, f"measured {analysis.facts.mass} velocity"
     axes.fill_between(found.time_s, low, high, color=style.MEASURED, alpha=0.85, label=label)
     if overlay is not None:
-        label = simulated_label(overlay.run)
+        label = style.simulated_label(overlay.run)
         for outline in (overlay.response.upper, overlay.response.lower):
             swept_s = overlay.response.time_s
             axes.plot(swept_s, factor * outline, color=style.SIMULATED, linewidth=0.7, label=label)
@@ -85,23 +75,23 @@ def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
 
 
 def _responses(axes: Axes, analysis: SweepAnalysis, overlay: SweepOverlay | None, what: str) -> None:
-    measured, attribute = analysis.response, ATTRIBUTES[what]
+    measured, attribute = analysis.response, style.ATTRIBUTES[what]
     for region in analysis.collisions.regions:
         axes.axvspan(region.low_hz, region.high_hz, color=style.COLLIDING, zorder=0)
     if overlay is not None:
         sines = overlay.prediction
-        draw_sines(axes, sines.frequency_hz, sines, what, "predicted steady sines at measured A0")
+        style.draw_sines(axes, sines.frequency_hz, sines, what, "predicted steady sines at measured A0")
     response = getattr(measured, attribute)
     axes.plot(measured.frequency_hz, response, color=style.MEASURED, label="measured response")
     if overlay is not None:
-        middle = draw_band(axes, measured.frequency_hz, overlay, what)
+        middle = style.draw_band(axes, measured.frequency_hz, overlay, what)
         simulated = getattr(overlay.response, attribute) if middle is None else middle
         axes.plot(overlay.response.frequency_hz, simulated, **style.SIMULATED_CURVE)
     for jump in analysis.jumps:
         axes.axvline(jump.frequency_hz, color=style.TERMINAL, linestyle=":", linewidth=1.0, label="jump")
     axes.set_xlim(*sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1]))))
     style.magnitude_axis(axes)
-    axes.set_ylabel(RESPONSE_LABELS[what])
+    axes.set_ylabel(style.RESPONSE_LABELS[what])
 
 
 def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
@@ -127,7 +117,7 @@ def sweep_caption(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> str:
             else ""
         )
         sentences += [
-            run_text(overlay),
+            style.run_text(overlay),
             f"In the first of these runs, {regions_text(overlay.collisions)}.{smooth}",
             "Blue dots: steady sines started from rest, without the history of the sweep.",
         ]
@@ -165,8 +155,8 @@ def _tables(analysis: SweepAnalysis, overlay: SweepOverlay | None) -> tuple[Tabl
     if overlay is None:
         return (table(name, **content),)
     envelope = "velocity_upper_simulated_m_per_s=upper velocity_lower_simulated_m_per_s=lower"
-    content |= columns(overlay.response, envelope) | simulated_responses(overlay)
-    return table(name, **content), sines_table(name, overlay.prediction)
+    content |= columns(overlay.response, envelope) | style.simulated_responses(overlay)
+    return table(name, **content), style.sines_table(name, overlay.prediction)
 
 
 _ORDERS_HEIGHT_IN = 6.0

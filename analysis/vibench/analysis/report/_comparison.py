@@ -1,18 +1,26 @@
-"""Figure of overlaid curves as on the Compare page of the window, in light colours for printing."""
+"""Export of a comparison: figure in light colours for printing, table, or full report of the recordings."""
 
 from collections.abc import Mapping, Sequence
+from enum import StrEnum
+from itertools import chain, count
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from vibench.acquisition import printable
+from vibench.sim.operating_system.this import replace_file
 
 from ..comparison import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
-from ..tables import Table, columns, rows, table
-from . import style
+from ..results.campaign_results import CampaignResults, without_copies
+from ..results.compared_recording import ComparedRecording, stored_result
+from ..tables import Table, columns, rows, table, write_csv
+from . import _style as style
+from ._report import write_report
 
+Pair = tuple[Curve, Curve]
 Dashes: TypeAlias = str | tuple[int, tuple[int, ...]]
 _HEIGHT_IN = 4.6
 _DIFFERENCE_IN = 1.4
@@ -33,7 +41,7 @@ _SINGLE_BAND = 0.2
 def comparison_figure(
     name: str,
     curves: Sequence[Curve],
-    pair: tuple[Curve, Curve] | None = None,
+    pair: Pair | None = None,
     markers_hz: Sequence[float] = (),
 ) -> style.DrawnFigure:
     """Draw curves with their bounds, the difference of two curves, and vertical markers.
@@ -109,7 +117,7 @@ def _span(curves: Sequence[Curve]) -> tuple[float, float]:
     return (low, high) if high > low else (low * (1 - _SINGLE_BAND), high * (1 + _SINGLE_BAND))
 
 
-def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
+def comparison_caption(curves: Sequence[Curve], pair: Pair | None) -> str:
     """Return the caption: the note of each curve, and the difference between the pair's curves."""
     sentences = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
     sentences.append("Shaded: two standard deviations.")
@@ -122,9 +130,7 @@ def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None
     return " ".join(sentences)
 
 
-def comparison_tables(
-    name: str, curves: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
-) -> tuple[Table, ...]:
+def comparison_tables(name: str, curves: Sequence[Curve], pair: Pair | None = None) -> tuple[Table, ...]:
     """Return tables of every curve, of its peaks, and of the difference of the pair."""
     found = [
         table(
@@ -155,3 +161,97 @@ def comparison_tables(
 def _file_word(curve: Curve) -> str:
     kept = (each if each.isalnum() or each in "-_" else "_" for each in curve.name.replace(", ", "_"))
     return "".join(kept)
+
+
+class ExportKind(StrEnum):
+    """Export formats of a comparison; the value is the file suffix."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+    CSV = "csv"
+    HTML = "html"
+    """Full report of the compared recordings."""
+
+
+def write_comparison(
+    path: Path,
+    curves: Sequence[Curve],
+    recordings: Sequence[ComparedRecording],
+    pair: Pair | None = None,
+    markers_hz: Sequence[float] = (),
+) -> Path:
+    """Write a comparison as a report, a table or a picture; return the path of the file.
+
+    Raises InvalidRequest when the suffix is unknown, or there is nothing to write.
+
+    Parameters
+    ----------
+    path
+        The suffix selects the format: ``.html``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``. If the file
+        exists, ``NAME-2`` is written.
+    curves
+        Curves of the table and the pictures, over frequency [Hz].
+    recordings
+        Recordings for the report.
+    pair
+        Two of the curves, whose difference is also shown.
+    markers_hz
+        Frequencies of vertical lines in pictures [Hz].
+    """
+    try:
+        kind = ExportKind(path.suffix.removeprefix(".").lower())
+    except ValueError as unknown:
+        allowed = ", ".join(f".{each.value}" for each in ExportKind)
+        raise InvalidRequest(f"{path.name!r} was given; its suffix must be one of {allowed}") from unknown
+    target = first_free_path(path)
+    match kind:
+        case ExportKind.HTML:
+            _report(target, recordings)
+        case ExportKind.CSV:
+            write_csv(comparison_table(target.stem, curves, pair), target)
+        case _:
+            drawn = comparison_figure(target.stem, curves, pair, markers_hz)
+            with replace_file(target) as coming:
+                coming.write_bytes(getattr(drawn, kind.value))
+    return target
+
+
+def _report(target: Path, recordings: Sequence[ComparedRecording]) -> None:
+    if not recordings:
+        raise InvalidRequest("a report without recordings was requested; add a recording to the comparison")
+    kept = [stored_result(each) for each in recordings]
+    failures = tuple(failure for _, failed in kept for failure in failed)
+    results = without_copies([result for result, _ in kept])
+    write_report(CampaignResults(target.stem, results, failures), target)
+
+
+def comparison_table(name: str, curves: Sequence[Curve], pair: Pair | None) -> Table:
+    """Return all curves in one table; each heading names a curve and a unit."""
+    if not curves:
+        raise InvalidRequest("a table without curves was requested; choose one or more curves")
+    columns: list[tuple[str, tuple[float | str, ...]]] = []
+    for each in curves:
+        columns += [
+            (f"frequency [Hz] ({each.name})", _cells(each.frequency_hz)),
+            (f"|x / U| [1] ({each.name})", _cells(each.magnitude)),
+            (f"relative standard deviation [1] ({each.name})", _cells(each.relative_sd)),
+        ]
+    if pair is not None:
+        difference = curve_difference(*pair)
+        names = f"{pair[0].name} over {pair[1].name}"
+        columns += [
+            (f"frequency [Hz] ({names})", _cells(difference.frequency_hz)),
+            (f"difference [dB] ({names})", _cells(difference.decibel)),
+        ]
+    return Table(name, tuple(columns))
+
+
+def _cells(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple[float | str, ...]:
+    return tuple(float(value) if np.isfinite(value) else "" for value in values)
+
+
+def first_free_path(path: Path) -> Path:
+    """Return the first of ``NAME.svg``, ``NAME-2.svg``, ... that does not exist yet."""
+    numbered = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))
+    return next(each for each in chain((path,), numbered) if not each.exists())

@@ -1,6 +1,8 @@
-"""Figures of branches, maps, basins of attraction and bifurcation diagrams."""
+"""Figures of branches, maps, basins of attraction and bifurcation diagrams, with results of recordings."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -25,11 +27,19 @@ from ..dynamics import (
     map_caption,
     motion_classes,
     motion_words,
+    recorded_level,
 )
-from ..signals.arrays import Reals
-from ..sine.stepped_response import TrackedResonance
+from ..errors import NotEnoughData
+from ..hidden_motion import HiddenMotion
+from ..kinds import ANALYSES
+from ..recordings.facts import known_specimen, specimen_difference
+from ..results.campaign_results import CampaignResults
+from ..signals import Reals
+from ..sine.stepped_response import SteppedResponse, TrackedResonance, lost_levels, tracked_resonances
+from ..sine.sweep import SweepResponse
 from ..tables import SHOWN, Table, rows, table
-from . import style
+from . import _style as style
+from ._hidden_motion import hidden_impacts_figure, hidden_motion_figure
 
 _HEIGHT_IN = 5.6
 _GROWTH_HEIGHT_IN = 1.8
@@ -377,3 +387,98 @@ def motion_table(motions: Sequence[MapMotion]) -> Table:
         period=[-1 if each.period is None else each.period for each in motions],
         **rows(motions, "response_i response_ii share=share.share share_low=share.low share_high=share.high"),
     )
+
+
+def model_figures(
+    results: CampaignResults,
+    diagrams: Sequence[BranchDiagram],
+    maps: Sequence[MapResults],
+    hidden: Sequence[HiddenMotion],
+) -> Iterator[style.DrawnFigure]:
+    """Draw branches, maps and hidden motions; see `write_report`."""
+    yield from draw_branches(results, diagrams)
+    yield from draw_maps(results, maps)
+    yield from (draw(each) for each in hidden for draw in (hidden_motion_figure, hidden_impacts_figure))
+
+
+def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[style.DrawnFigure]:
+    """Draw each map, overlaid with levels and Response I of stepped sines and sweeps."""
+    levels = _recorded_levels(results, CurveKind.RESPONSE_I)
+    for number, found in enumerate(maps, start=1):
+        drawn = map_figure(found, levels=levels if found.plan.is_over_drive else ())
+        yield replace(drawn, name=f"map_{number}")
+
+
+def _recorded_levels(results: CampaignResults, *kinds: CurveKind) -> list[RecordedLevel]:
+    """Return level, responses and specimen of each stepped sine and sweep over a range of frequencies."""
+    levels = []
+    for each in results.in_order:
+        facts, found = each.analysis.facts, each.analysis.response
+        if isinstance(found, SweepResponse | SteppedResponse):
+            with suppress(NotEnoughData):
+                level = recorded_level(found.frequency_hz, found.drive_amplitude_m)
+                measured = ANALYSES[each.kind].curves(facts.name, CurveOrigin.MEASURED, found)
+                shown = [curve for curve in measured if not kinds or curve.response in kinds]
+                levels.append(RecordedLevel(facts.name, level, shown, known_specimen(facts.bench)))
+    return levels
+
+
+def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[style.DrawnFigure]:
+    """Draw each branch diagram; diagrams over frequency also show results of stepped sines and sweeps."""
+    levels = _recorded_levels(results)
+    for number, diagram in enumerate(diagrams, start=1):
+        if diagram.request.resonance_band_hz is not None:
+            drawn = _backbones(results, diagram)
+        elif diagram.request.along is not Parameter.FREQUENCY:
+            drawn = branches_figure(diagram)
+        else:
+            drawn = branches_figure(diagram, [curve for level in levels for curve in level.measured])
+            sentences = (_level_sentence(diagram, each) for each in levels)
+            drawn = replace(drawn, caption=" ".join((drawn.caption, *sentences)))
+        yield replace(drawn, name=f"branches_{number}")
+
+
+def _backbones(results: CampaignResults, diagram: BranchDiagram) -> style.DrawnFigure:
+    """Draw a computed phase resonance with the tracked resonances near it."""
+    low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
+    facts = [each.analysis.facts for each in results.in_order]
+    bands = [each.measurement.excitation.band_hz for each in facts]
+    near = [each for each, band in zip(facts, bands, strict=True) if band[0] < high_hz and low_hz < band[1]]
+    drawn = branches_figure(
+        diagram, tracked=[track for each in near for track in tracked_resonances(each.feedback)]
+    )
+    sentences = [_lost_sentence(diagram, level) for each in near for level in lost_levels(each.feedback)]
+    for each in near:
+        recorded = known_specimen(each.bench)
+        sentences.append(specimen_difference(diagram.request.chosen_specimen, recorded, each.name))
+    return replace(drawn, caption=" ".join(filter(None, (drawn.caption, *sentences))))
+
+
+def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
+    """State the model's largest Floquet multipliers at a level without resonance, or that there are none."""
+    sizes: list[float] = []
+    for line in diagram.lines:
+        above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
+        sizes += line.largest_multiplier[1:][above[1:] != above[:-1]].tolist()
+    text = f"At {level_m_per_s2:g} m/s² the control did not lock onto a periodic motion;"
+    if not sizes:
+        return f"{text} the branches contain no periodic motion at this level."
+    multipliers = ", ".join(f"{each:.3g}" for each in sizes)
+    return f"{text} the largest Floquet multiplier of the modelled motion is {multipliers}."
+
+
+def _level_sentence(diagram: BranchDiagram, level: RecordedLevel) -> str:
+    """State how base amplitude and specimen of a recording differ from those of the branches."""
+    request = diagram.request
+    ratios = [
+        amplitude / request.path.drive(frequency)[1]
+        for frequency, amplitude in level.pairs
+        if request.start <= frequency <= request.stop
+    ]
+    name, difference = level.name, level.difference(request.chosen_specimen)
+    if not ratios:
+        text = f"The drive of {name} was outside the frequency range of the branches."
+    else:
+        low, high = np.min(ratios), np.max(ratios)
+        text = f"The base amplitude of {name} is {low:.2g} to {high:.2g} times the amplitude of the branches."
+    return f"{text} {difference}".rstrip()
