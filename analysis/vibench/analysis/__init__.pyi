@@ -13,10 +13,7 @@ from .errors import (
     NotEnoughData as NotEnoughData,
 )
 from .fit.lines import Parameter as Parameter
-from .fit.updated_specimen import (
-    UpdatedSpecimen as UpdatedSpecimen,
-    update_model as update_model,
-)
+from .fit.updated_specimen import UpdatedSpecimen as UpdatedSpecimen, update_model as update_model
 from .frequency_response.modal_fit import Resonance as Resonance
 from .frequency_response.resonance import resonances as resonances
 from .frequency_response.results import (

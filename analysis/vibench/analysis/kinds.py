@@ -31,6 +31,7 @@ from .frequency_response.noise_response import (
 )
 from .frequency_response.results import FrequencyResponseRequest
 from .overlay.draws import Draw, DrawSet
+from .overlay.driven_rig import SimulatedChannels
 from .overlay.ensemble import Ending, Quantity
 from .overlay.overlay import (
     AbstractOverlay,
@@ -48,10 +49,10 @@ from .overlay.overlay import (
     sweep_overlay,
     sweep_quantities,
 )
-from .overlay.simulated_channels import SimulatedChannels
 from .recordings.channels import BASE, RecordedChannels, Stretch
 from .recordings.checks import AbstractAnalysis, Check, Verdict, is_acceleration, measurement_checks
 from .recordings.facts import RecordingFacts, known_specimen
+from .sine import sweep_analysis
 from .sine.dwell import DwellResponse
 from .sine.dwell_analysis import (
     WINDOW_S,
@@ -67,8 +68,8 @@ from .sine.dwell_analysis import (
     slow_line_check,
     terminal_levels,
 )
-from .sine.jumps import SteppedLevelAnalysis
 from .sine.stepped_response import (
+    SteppedLevelAnalysis,
     SteppedResponse,
     SteppedSineAnalysis,
     Steps,
@@ -76,16 +77,6 @@ from .sine.stepped_response import (
     stepped_response,
 )
 from .sine.sweep import SweptMotion
-from .sine.sweep_analysis import (
-    Sweep,
-    SweepAnalysis,
-    SweepDraws,
-    collisions,
-    frequency_check,
-    measured_sweep,
-    played_check,
-    smooth_jumps,
-)
 from .tables import Tabular
 from .uncertainty.budget import Budget, dwell_budgets, noise_budgets, stepped_budgets, sweep_budgets
 
@@ -110,7 +101,7 @@ class Result(Tabular, Generic[A, L]):
 
 AnyResult: TypeAlias = Result[Any, Any]
 NoiseResult: TypeAlias = Result[NoiseAnalysis, NoiseOverlay]
-SweepResult: TypeAlias = Result[SweepAnalysis, SweepOverlay]
+SweepResult: TypeAlias = Result[sweep_analysis.SweepAnalysis, SweepOverlay]
 DwellResult: TypeAlias = Result[DwellAnalysis, DwellOverlay]
 SteppedSineResult: TypeAlias = Result[SteppedSineAnalysis, SteppedSineOverlay]
 
@@ -209,23 +200,23 @@ STREAMED_NOISE = _noise(_estimate_streamed, again=lambda _: _estimate_streamed)
 
 
 def _analyse_sweep(
-    facts: RecordingFacts, channels: RecordedChannels, plan: Sweep, _: FrequencyResponseRequest
-) -> SweepAnalysis:
+    facts: RecordingFacts, channels: RecordedChannels, plan: sweep_analysis.Sweep, _: FrequencyResponseRequest
+) -> sweep_analysis.SweepAnalysis:
     # The linear simulation predicts only m0. If the sensor is on another mass, find collisions without it.
     specimen = known_specimen(facts.bench) if facts.mass == "m0" else None
-    response, picture = measured_sweep(channels, plan, specimen)
-    colliding = collisions(response)
-    jumps = smooth_jumps(response, colliding)
-    checks = (*measurement_checks(facts), played_check(response, plan))
-    return SweepAnalysis(facts, checks, plan, response, colliding, jumps, picture)
+    response, picture = sweep_analysis.measured_sweep(channels, plan, specimen)
+    colliding = sweep_analysis.collisions(response)
+    jumps = sweep_analysis.smooth_jumps(response, colliding)
+    checks = (*measurement_checks(facts), sweep_analysis.played_check(response, plan))
+    return sweep_analysis.SweepAnalysis(facts, checks, plan, response, colliding, jumps, picture)
 
 
-def _draws(analysis: SweepAnalysis) -> Callable[[SimulatedChannels], Draw[SweptMotion]]:
-    swept = SweepDraws(analysis.excitation, known_specimen(analysis.facts.bench))
+def _draws(analysis: sweep_analysis.SweepAnalysis) -> Callable[[SimulatedChannels], Draw[SweptMotion]]:
+    swept = sweep_analysis.SweepDraws(analysis.excitation, known_specimen(analysis.facts.bench))
 
     def draw(channels: SimulatedChannels) -> Draw[SweptMotion]:
         found = swept.motion(channels)
-        colliding = collisions(found)
+        colliding = sweep_analysis.collisions(found)
         impacts = channels.played_impacts(SegmentLabel.SWEEP)
         return Draw(lambda: found, sweep_quantities(found, colliding), sweep_endings(colliding), *impacts)
 
@@ -254,7 +245,10 @@ def _analyse_dwell(
     if motion.verdict.kind not in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         found = found.with_rest_as_noise(is_known_to_repeat=motion.verdict.kind is MotionKind.PERIODIC)
     found_hz = np.array([found.drive.frequency_hz])
-    checks = (*measurement_checks(facts), frequency_check(found_hz, np.array([plan.frequency_hz])))
+    checks = (
+        *measurement_checks(facts),
+        sweep_analysis.frequency_check(found_hz, np.array([plan.frequency_hz])),
+    )
     checks += slow_line_check(found)
     if motion.verdict.kind is MotionKind.PERIODIC:  # other motions change by themselves
         checks += (settled_check("Dwell settled", found_hz, np.array([found.slow_change])),)
@@ -315,7 +309,7 @@ def stepped_analysis(
         planned_hz = np.array(
             [each.numbers["frequency_hz"] for each in channels.stretches(label)], dtype=float
         )
-        frequency = frequency_check(response.frequency_hz, planned_hz)
+        frequency = sweep_analysis.frequency_check(response.frequency_hz, planned_hz)
         settled = settled_check("Steps settled", response.frequency_hz, response.slow_change)
         checks = (*measurement_checks(facts), frequency, settled)
         return result(facts, checks, plan, response)

@@ -8,7 +8,7 @@ from vibench.acquisition.recording import SegmentLabel
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.kinds import stepped_analysis
 from vibench.analysis.overlay.draws import Draw
-from vibench.analysis.overlay.simulated_channels import SimulatedChannels
+from vibench.analysis.overlay.driven_rig import SimulatedChannels
 from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 
 

@@ -18,9 +18,9 @@ from vibench.analysis import (
 )
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.frequency_response.noise_response import NoiseAnalysis
-from vibench.analysis.frequency_response.scan import scans_of
 from vibench.analysis.report import write_report
 from vibench.analysis.results.compared_recording import compare_recording
+from vibench.analysis.results.spectral_functions import scans_of
 from vibench.cli.__main__ import app
 from vibench.sim import gong2025
 

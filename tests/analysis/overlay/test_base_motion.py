@@ -7,7 +7,7 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.overlay.simulated_channels import (
+from vibench.analysis.overlay.driven_rig import (
     advance,
     lowest_frequency_hz,
     recorded_base_motion,

@@ -7,8 +7,7 @@ import pytest
 
 from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.analysis import InvalidRequest
-from vibench.analysis.sine.jumps import hysteresis, jumps
-from vibench.analysis.sine.sweep_analysis import collisions, smooth_jumps
+from vibench.analysis.sine.sweep_analysis import collisions, hysteresis, jumps, smooth_jumps
 from vibench.sim import (
     BalanceOptions,
     BifurcationKind,

@@ -9,8 +9,7 @@ from vibench.acquisition.plan import SteppedLevel
 from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.kinds import Result
 from vibench.analysis.report import findings, result_figures
-from vibench.analysis.sine.jumps import hysteresis_vpp, level_jumps
-from vibench.analysis.sine.stepped_response import SteppedResponse
+from vibench.analysis.sine.stepped_response import SteppedResponse, hysteresis_vpp, level_jumps
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ from vibench.sim.chain import (
 
 from ..errors import InvalidRequest
 from ..frequency_response.transmissibility import transmissibility
-from ..overlay.simulated_channels import recorded_base_motion
+from ..overlay.driven_rig import recorded_base_motion
 from ..recordings.channels import BASE
 from ..recordings.facts import plan_of, require_intact, require_measured_size, require_usable
 from ..signals import PER_NEPER_DB, Reals

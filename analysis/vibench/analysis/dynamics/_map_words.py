@@ -10,7 +10,7 @@ from vibench.sim.maps import QUANTITIES, Map, MapMotion, MapResults
 
 from ..comparison import Curve
 from ..errors import NotEnoughData
-from ..recordings.facts import specimen_difference as specimen_difference, value_words
+from ..recordings.facts import specimen_difference as specimen_difference, value_words  # noqa: PLC0414 - public
 from ..signals import Reals
 
 MOTION_CLASSES = (

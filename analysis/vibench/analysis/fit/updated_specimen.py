@@ -20,13 +20,7 @@ from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
 from ..tables import Tabular, columns, plain, plus_minus
 from ..uncertainty.budget import stated_uncertainties
-from .collision_numbers import (
-    CollisionNumbers,
-    Way,
-    numbers_from_statistics,
-    onset_gap,
-    track_recordings,
-)
+from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, onset_gap, track_recordings
 from .lines import LINEAR, SHOWN, FittedValue, Parameter, with_values
 from .specimen_fit import Assumption, SpecimenFit, Suspect, fit_specimen, not_linear
 

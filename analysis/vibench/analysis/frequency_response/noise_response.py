@@ -26,7 +26,6 @@ from ..signals import (
 from ..spectra import DensitySums
 from ..tables import Tabular, columns
 from ..tones import NoiseDriveLevel, noise_drive_level
-from .hits import Hits, HitSpectra, find_hits, hit_spectra, with_assumed_scatter, without_bounds
 from .modal_fit import SMALLEST_RELATIVE_SD, Resonance
 from .periodic import Drift, PeriodicFrequencyResponse, PeriodicSums, Repetition
 from .resonance import resonances, scattered_resonances
@@ -38,7 +37,17 @@ from .results import (
     FrequencyResponseView,
     converted_frequency_response,
 )
-from .transmissibility import FrequencyResponseSums, coherence, least_squares
+from .transmissibility import (
+    FrequencyResponseSums,
+    Hits,
+    HitSpectra,
+    coherence,
+    find_hits,
+    hit_spectra,
+    least_squares,
+    with_assumed_scatter,
+    without_bounds,
+)
 
 
 @dataclass(frozen=True)

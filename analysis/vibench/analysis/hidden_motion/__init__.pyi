@@ -5,10 +5,7 @@ from ._contact_free import (
     FreeMotion as FreeMotion,
     measured_gaps as measured_gaps,
 )
-from ._found_parameters import (
-    FoundParameter as FoundParameter,
-    FoundSpecimen as FoundSpecimen,
-)
+from ._found_parameters import FoundParameter as FoundParameter, FoundSpecimen as FoundSpecimen
 from ._hidden_motion import (
     HiddenMotion as HiddenMotion,
     TrackedMotion as TrackedMotion,
@@ -38,12 +35,8 @@ from ._live_twin import (
     keep_baseline as keep_baseline,
     kept_baseline as kept_baseline,
 )
-from ._prepared_motion import (
-    ChannelNoise as ChannelNoise,
-)
-from ._tracking import (
-    TrackGap as TrackGap,
-)
+from ._prepared_motion import ChannelNoise as ChannelNoise
+from ._tracking import TrackGap as TrackGap
 from ._tracking_model import (
     Hidden as Hidden,
     Numbers as Numbers,

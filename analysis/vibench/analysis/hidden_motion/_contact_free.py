@@ -11,9 +11,16 @@ from vibench.sim.engine.run import native_engine
 from ..errors import NotEnoughData
 from ..signals import Flags, Reals, Samples, runs_of
 from ..tables import Tabular
-from ._filtering import MotionModel, motion_model, run_filter
 from ._prepared_motion import PreparedMotion
-from ._tracking import LatentMotion, TrackedPiece, latent_motion, latent_start
+from ._tracking import (
+    LatentMotion,
+    MotionModel,
+    TrackedPiece,
+    latent_motion,
+    latent_start,
+    motion_model,
+    run_filter,
+)
 from ._tracking_model import PRIOR_SD, SEARCHES, Hidden, TrackedSpecimen, value_of, with_values
 
 _BLOCK_S, _OVERLAP_S = 0.12, 0.02

@@ -15,19 +15,9 @@ from scipy.stats import t as student
 
 from ..signals import Reals
 from ..tables import Tabular, unit_of, with_unit
-from ._contact_free import (
-    FEWEST_IMPACTS,
-    FITTED,
-    FreeGap,
-    FreeImpacts,
-    free_gaps,
-    free_loss,
-    free_motion,
-    free_numbers,
-)
-from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, move_filter, run_filter
+from . import _contact_free as contact_free
 from ._prepared_motion import PreparedMotion
-from ._tracking import acquire
+from ._tracking import LOSS_LIMIT, FilterState, MotionModel, acquire, motion_model, move_filter, run_filter
 from ._tracking_model import (
     NEAR,
     PRIOR_SD,
@@ -219,11 +209,11 @@ def search_start(
 ) -> tuple[TrackedSpecimen, Mapping[Hidden, float] | str]:
     """Return start values found without a contact model, and their prior, or else the reason."""
     rate = motion.sample_rate_hz
-    fitted, sds = free_numbers(described, motion, firsts)
+    fitted, sds = contact_free.free_numbers(described, motion, firsts)
     count = min(round(_FREE_S * rate), motion.samples)
     first = (motion.samples - count) // 2
-    free = free_motion(motion_model(fitted, motion), motion.part(first, first + count))
-    gaps = free_gaps(free.impacts)
+    free = contact_free.free_motion(motion_model(fitted, motion), motion.part(first, first + count))
+    gaps = contact_free.free_gaps(free.impacts)
     if not any(gaps):
         gaps = _gaps_by_law(fitted, free.impacts)
     if not any(gaps):
@@ -234,17 +224,18 @@ def search_start(
             "the linear parameters of the specimen are wrong; fit these parameters to weak noise first"
         )
     sides = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), gaps, strict=True))
-    known: dict[Hidden, FreeGap] = {
+    known: dict[Hidden, contact_free.FreeGap] = {
         side: gap for side, gap in sides.items() if gap is not None and isfinite(value_of(described, side))
     }
     start = with_values(fitted, {side: gap.value_m for side, gap in known.items()})
-    loss = free_loss(free.impacts)
+    loss = contact_free.free_loss(free.impacts)
     if loss is not None and loss > _TELLING_LOSS:
         start = with_values(start, {Hidden.LOSS: loss})
     near = {**NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05, Hidden.LOSS: 0.1}
     near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
     near |= {
-        each: max(SEARCHES[each].least_sd, 3.0 * float(sd)) for each, sd in zip(FITTED, sds, strict=True)
+        each: max(SEARCHES[each].least_sd, 3.0 * float(sd))
+        for each, sd in zip(contact_free.FITTED, sds, strict=True)
     }
     return start, searched_parameters(described, near)
 
@@ -254,16 +245,18 @@ def searched_parameters(described: TrackedSpecimen, near: Mapping[Hidden, float]
     return {each: sd for each, sd in near.items() if isfinite(value_of(described, each))}
 
 
-def _gaps_by_law(described: TrackedSpecimen, impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
+def _gaps_by_law(
+    described: TrackedSpecimen, impacts: contact_free.FreeImpacts
+) -> tuple[contact_free.FreeGap | None, contact_free.FreeGap | None]:
     """Return the gaps from impacts of similar strength: |p| minus the depth that the described law gives."""
 
-    def gap(side: float) -> FreeGap | None:
+    def gap(side: float) -> contact_free.FreeGap | None:
         here = impacts.sides == side
-        if int(here.sum()) < FEWEST_IMPACTS:
+        if int(here.sum()) < contact_free.FEWEST_IMPACTS:
             return None
         depth_m = indentation_m(described, float(np.median(impacts.rate_before[here])))
         value_m = float(np.median(np.abs(impacts.p[here]))) - depth_m
-        return FreeGap(value_m, _LAW_UNKNOWN * depth_m, int(here.sum()))
+        return contact_free.FreeGap(value_m, _LAW_UNKNOWN * depth_m, int(here.sum()))
 
     return gap(-1.0), gap(1.0)
 

@@ -17,17 +17,7 @@ from ..recordings.channels import BASE, RESPONSE, ResponseChannel, response_role
 from ..recordings.facts import require_checked, require_usable, specimen_of
 from ..signals import Reals, Samples
 from ..tables import Tabular, columns, plain, with_unit
-from ._contact_free import (
-    Collisions,
-    FreeGap,
-    FreeImpacts,
-    FreeMotion,
-    collisions_of,
-    free_gaps,
-    free_motion,
-    join_collisions,
-)
-from ._filtering import MotionModel, motion_model
+from . import _contact_free as contact_free
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, without_values
 from ._prepared_motion import (
     HALF_LENGTH,
@@ -38,7 +28,7 @@ from ._prepared_motion import (
     sensor_correction,
     white_noise,
 )
-from ._tracking import TrackedPiece, TrackGap, follow
+from ._tracking import MotionModel, TrackedPiece, TrackGap, follow, motion_model
 from ._tracking_model import VY, VZ, Hidden, Numbers, TrackedSpecimen, W, tracked_specimen
 
 _RATES = {"m1": VY, "m2": VZ}
@@ -163,7 +153,7 @@ class TrackedMotion(Tabular):
     """Rate of change of p [m/s]."""
     p_sd: Samples
     """Standard deviation of p [m]."""
-    collisions: Collisions
+    collisions: contact_free.Collisions
     not_followed: tuple[TrackGap, ...]
     innovation_level: float
     """Mean squared normalised innovation in flight; 1 if only noise remains."""
@@ -194,8 +184,8 @@ class HiddenMotion(Tabular):
     found: FoundSpecimen | None
     """Parameters found from collisions; None if the description was used."""
     tracked: TrackedMotion
-    free: FreeMotion
-    free_gaps: tuple[FreeGap | None, FreeGap | None]
+    free: contact_free.FreeMotion
+    free_gaps: tuple[contact_free.FreeGap | None, contact_free.FreeGap | None]
     """Lower and upper gap without a contact model."""
     mass_checks: tuple[MassCheck, ...] = ()
     """Checks of the track against sensors on m1 and m2, if recorded."""
@@ -372,7 +362,7 @@ def hidden_motion_of(
     if found is not None and why_not:
         found = without_values(found, why_not)
     on_free = stage(observer, f"{name}: hidden motion without a contact model")
-    free = free_motion(model, motion, lambda sample: on_free(sample, motion.samples))
+    free = contact_free.free_motion(model, motion, lambda sample: on_free(sample, motion.samples))
     found_motion = HiddenMotion(
         name,
         motion.sample_rate_hz,
@@ -382,7 +372,7 @@ def hidden_motion_of(
         found,
         followed,
         free,
-        free_gaps(free.impacts),
+        contact_free.free_gaps(free.impacts),
         checks,
     )
     if found_motion.is_confirmed:
@@ -412,7 +402,7 @@ def _track_motion(
 ) -> TrackedMotion:
     # Single precision is enough and halves the memory.
     p, rate, sd = (np.full(motion.samples, np.nan, dtype=np.float32) for _ in range(3))
-    collisions: list[Collisions] = []
+    collisions: list[contact_free.Collisions] = []
     lost: list[TrackGap] = []
     squared, used = 0.0, 0
     for part in follow(model, motion, on_progress):
@@ -421,7 +411,7 @@ def _track_motion(
                 place = slice(part.first, part.stop)
                 p[place], rate[place] = part.smoothed.p, part.smoothed.rate
                 sd[place] = np.sqrt(part.smoothed.variances[:, 0])
-                collisions.append(collisions_of(model, motion, part))
+                collisions.append(contact_free.collisions_of(model, motion, part))
                 for each in masses:
                     each.add(part)
                 here = part.run.nis
@@ -432,7 +422,7 @@ def _track_motion(
     level = squared / used if used else float("nan")
     sd *= np.float32(np.sqrt(max(1.0, level if used else 1.0)))
     np.hypot(sd, np.float32(_gap_sd(found)), out=sd)
-    return TrackedMotion(p, rate, sd, join_collisions(collisions), tuple(lost), level)
+    return TrackedMotion(p, rate, sd, contact_free.join_collisions(collisions), tuple(lost), level)
 
 
 def _fault_of_numbers(tracked: TrackedMotion, checks: Sequence[MassCheck]) -> str:
@@ -551,7 +541,7 @@ def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
 def _impacts(
     motion: HiddenMotion,
     name: str,
-    found: Collisions | FreeImpacts,
+    found: contact_free.Collisions | contact_free.FreeImpacts,
     quantities: Mapping[str, tuple[str, str]],
 ) -> dict[str, ResultArray]:
     """Return the times of impacts, and their quantities, each with its attribute and its unit."""

@@ -27,7 +27,7 @@ from vibench.sim.operating_system.this import replace_file, state_folder
 from ..recordings.channels import BASE, RESPONSE
 from ..signals import Reals
 from ..tables import Tabular
-from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, run_filter
+from . import _tracking as tracking
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
 from ._prepared_motion import (
     HALF_LENGTH,
@@ -38,7 +38,6 @@ from ._prepared_motion import (
     sensor_correction,
     white_noise,
 )
-from ._tracking import ACQUISITION_S, acquire, reliable_samples
 from ._tracking_model import (
     STATES,
     VX,
@@ -92,9 +91,9 @@ class Forecaster:
 
     def forecast(
         self,
-        model: MotionModel,
+        model: tracking.MotionModel,
         motion: PreparedMotion,
-        at: FilterState,
+        at: tracking.FilterState,
         states: Reals,
         frequency_hz: float,
     ) -> Forecast | None:
@@ -114,8 +113,8 @@ class Forecaster:
         tone = _tones(turned * ahead).T @ weights[: 2 * _HARMONICS]
         yielding = _on_a_table(model, motion, weights[2 * _HARMONICS :])
         coming = replace(motion, acceleration=tone, velocity=np.zeros(tone.size))
-        start = FilterState(0, at.state[:STATES].copy(), at.covariance[:STATES, :STATES].copy())
-        run = run_filter(yielding, coming, start, self._count)
+        start = tracking.FilterState(0, at.state[:STATES].copy(), at.covariance[:STATES, :STATES].copy())
+        run = tracking.run_filter(yielding, coming, start, self._count)
         if run.states.shape[0] < self._count:
             return None
         p = run.states[:, Y] - run.states[:, Z]
@@ -144,7 +143,7 @@ def _tones(turns: Reals) -> Reals:
     return np.concatenate([(np.sin(n * turns), np.cos(n * turns)) for n in range(1, _HARMONICS + 1)])
 
 
-def _on_a_table(model: MotionModel, motion: PreparedMotion, weights: Reals) -> MotionModel:
+def _on_a_table(model: tracking.MotionModel, motion: PreparedMotion, weights: Reals) -> tracking.MotionModel:
     """Return the model with the fitted reaction of the specimen on the base."""
     a, base, _ = equations(model.specimen, motion.coupling_rad_per_s)
     a[:, _YIELDING] += np.outer(base, weights)
@@ -362,13 +361,13 @@ class LiveTwin:
 
     def warm_up(self) -> None:
         """Load the native library before the first sample, to avoid a delay later."""
-        count = round(4 * ACQUISITION_S * self._rate)
+        count = round(4 * tracking.ACQUISITION_S * self._rate)
         noise = 1e-3 * np.random.default_rng(1).standard_normal((2, count))
         self.take(0, noise[0], noise[1])
         assert self._motion.samples > 0
-        model = motion_model(self._tracked, self._motion)
-        at = FilterState(0, np.zeros(STATES), np.eye(STATES) * 1e-12)
-        run_filter(model, self._motion, at, 1, loss_limit=LOSS_LIMIT)
+        model = tracking.motion_model(self._tracked, self._motion)
+        at = tracking.FilterState(0, np.zeros(STATES), np.eye(STATES) * 1e-12)
+        tracking.run_filter(model, self._motion, at, 1, loss_limit=tracking.LOSS_LIMIT)
         self._begin_anew(0)
 
     def begin_run(self, usual: Level | None) -> None:
@@ -392,8 +391,8 @@ class LiveTwin:
             ChannelNoise(1.0, 1.0),
         )
         self._states = np.empty((0, STATES))
-        self._at: FilterState | None = None
-        self._model: MotionModel | None = None
+        self._at: tracking.FilterState | None = None
+        self._model: tracking.MotionModel | None = None
         self._state, self._why = LiveState.WAITING, "too few samples so far to begin tracking"
         self._looked = self._pause = 0
         self._find_at = sample + round(_FIND_S * self._rate)
@@ -491,7 +490,7 @@ class LiveTwin:
 
     def _acquire(self) -> None:
         motion = self._motion
-        window = round(ACQUISITION_S * self._rate)
+        window = round(tracking.ACQUISITION_S * self._rate)
         first = motion.samples - 2 - window
         if first < self._looked:
             return
@@ -502,8 +501,8 @@ class LiveTwin:
             return
         noise = ChannelNoise(white_noise(motion.acceleration[part]), white_noise(motion.velocity[part]))
         self._motion = replace(motion, noise=noise)
-        model = motion_model(self._tracked, self._motion)
-        begun = acquire(model, self._motion, first)
+        model = tracking.motion_model(self._tracked, self._motion)
+        begun = tracking.acquire(model, self._motion, first)
         match begun:
             case str():
                 is_misfit = "equations" in begun
@@ -511,17 +510,17 @@ class LiveTwin:
                 self._why = begun
                 if is_misfit:
                     self._wait_longer()
-            case FilterState():
+            case tracking.FilterState():
                 self._at, self._model = begun, model
                 self._state, self._why = LiveState.TRACKED, ""
 
-    def _advance(self, at: FilterState, count: int) -> None:
+    def _advance(self, at: tracking.FilterState, count: int) -> None:
         assert self._model is not None
         begin = at.sample + 1
-        run = run_filter(self._model, self._motion, at, count, loss_limit=LOSS_LIMIT)
+        run = tracking.run_filter(self._model, self._motion, at, count, loss_limit=tracking.LOSS_LIMIT)
         kept = run.states.shape[0]
         if kept < count:
-            kept = reliable_samples(run, self._rate)
+            kept = tracking.reliable_samples(run, self._rate)
             self._at, self._is_out = None, True
             self._state, self._why = LiveState.LOST, "the motion does not fit the specimen model"
             self._wait_longer()
@@ -597,7 +596,7 @@ class LiveTwin:
             }
             self._tracked = found.tracked
             if self._at is not None:
-                self._model = motion_model(found.tracked, self._motion)
+                self._model = tracking.motion_model(found.tracked, self._motion)
             self.watch = ChangeWatch()
 
     def _is_other(self, found: FoundParameter) -> bool:

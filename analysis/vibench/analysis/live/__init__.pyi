@@ -12,21 +12,12 @@ from ._outline import (
     thumbnail as thumbnail,
     zigzag as zigzag,
 )
-from ._ring import (
-    OVER_SHARE as OVER_SHARE,
-    Level as Level,
-    LevelVerdict as LevelVerdict,
-)
-from ._sine_response import (
-    Portrait as Portrait,
-)
+from ._ring import OVER_SHARE as OVER_SHARE, Level as Level, LevelVerdict as LevelVerdict
+from ._sine_response import Portrait as Portrait
 from ._spectra import (
     DensityPicture as DensityPicture,
     RowSpacing as RowSpacing,
     SpectrogramRequest as SpectrogramRequest,
     recording_spectrogram as recording_spectrogram,
 )
-from ._view import (
-    LiveChannel as LiveChannel,
-    LiveView as LiveView,
-)
+from ._view import LiveChannel as LiveChannel, LiveView as LiveView

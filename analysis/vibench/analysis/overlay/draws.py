@@ -27,13 +27,16 @@ from .driven_rig import (
     Driven,
     DrivenRig,
     FittedShaker,
+    SimulatedChannels,
     acceleration_per_volt,
+    advance,
+    base_band_hz,
     carried_mass,
     driven_rig,
     recorded_voltage,
+    under_base_motion,
 )
 from .ensemble import FEWEST_DRAWS, Ending, EnsembleCurve, Quantity, ensemble_curves
-from .simulated_channels import SimulatedChannels, advance, base_band_hz, under_base_motion
 
 _FEWEST_LINES = 50
 """Minimum number of spectral lines in silence; this number determines the noise level within 25 %."""

@@ -24,19 +24,12 @@ from vibench.sim import (
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..frequency_response.results import FrequencyResponse
 from ..signals import Envelope, Flags, Integers, Reals, runs_of
+from ..sine import dwell_analysis
 from ..sine.dwell import DwellResponse
-from ..sine.dwell_analysis import (
-    DwellAnalysis,
-    TerminalLevel,
-    bound_frequencies_hz,
-    settled_envelope,
-    spectrum_columns,
-    terminal_levels,
-)
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweptMotion
 from ..sine.sweep_analysis import Collisions, SweepAnalysis, collisions
-from ..tables import Tabular
+from ..tables import Tabular, columns
 from .draws import DrawSet, SimulatedRun
 from .ensemble import (
     MIXED,
@@ -236,7 +229,7 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
     )
 
     displacement: Envelope
-    terminal: tuple[TerminalLevel, ...]
+    terminal: tuple[dwell_analysis.TerminalLevel, ...]
     """Levels of the terminal bands; like `displacement`, from the first draw."""
     spectrum: EnsembleCurve
     """Spectrum of the displacement divided by A0; not compared, because the model has no noise floor."""
@@ -284,9 +277,7 @@ def noise_overlay(analysis: NoiseAnalysis, drawn: DrawSet[NoiseResponse]) -> Noi
     stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
     specimen = drawn.run.specimen
     return NoiseOverlay(
-        run=drawn.run,
-        response=drawn.response,
-        ensemble=drawn.ensemble,
+        **columns(drawn, "run response ensemble"),
         escape=None,
         difference=_difference(
             drawn,
@@ -371,9 +362,7 @@ def sweep_overlay(analysis: SweepAnalysis, drawn: DrawSet[SweptMotion]) -> Sweep
     grid = prediction_grid(specimen, low, high)
     amplitude_m = np.interp(grid, measured.frequency_hz[rising], measured.drive_amplitude_m[rising])
     return SweepOverlay(
-        run=drawn.run,
-        response=drawn.response,
-        ensemble=drawn.ensemble,
+        **columns(drawn, "run response ensemble"),
         escape=escape_rate(sweep_endings(analysis.collisions), drawn.endings),
         collisions=collisions(drawn.response),
         difference=_sine_difference(drawn, measured),
@@ -391,7 +380,7 @@ def dwell_quantities(
     """Return a dwell's quantities that are compared with draws: responses, phase, bands and spectrum."""
     at = np.array([response.drive.frequency_hz])
     state = np.array([sum(each.ended for each in endings)], dtype=np.int64)
-    columns_hz, size = spectrum_columns(response)
+    columns_hz, size = dwell_analysis.spectrum_columns(response)
     bands = (
         Quantity(
             f"band around {each.towards_hz:.0f} Hz, relative to the line of the drive",
@@ -399,7 +388,7 @@ def dwell_quantities(
             np.array([ratio if (ratio := 10 ** (each.decibel / 20)) > _LEAST_BAND else np.nan]),
             state,
         )
-        for each in terminal_levels(response, towards_hz)
+        for each in dwell_analysis.terminal_levels(response, towards_hz)
     )
     return (
         *sine_quantities(response, at, state),
@@ -409,10 +398,10 @@ def dwell_quantities(
 
 
 def dwell_overlay(
-    analysis: DwellAnalysis, drawn: DrawSet[DwellResponse], endings: Sequence[Ending]
+    analysis: dwell_analysis.DwellAnalysis, drawn: DrawSet[DwellResponse], endings: Sequence[Ending]
 ) -> DwellOverlay:
     """Compare a dwell with the draws; ``endings`` are the measured ends of the motion."""
-    towards_hz = bound_frequencies_hz(analysis.facts)
+    towards_hz = dwell_analysis.bound_frequencies_hz(analysis.facts)
     measured = analysis.response
     *ensemble, spectrum = drawn.ensemble
     return DwellOverlay(
@@ -421,8 +410,8 @@ def dwell_overlay(
         ensemble=tuple(ensemble),
         spectrum=spectrum,
         escape=escape_rate(endings, drawn.endings),
-        displacement=settled_envelope(drawn.response),
-        terminal=terminal_levels(drawn.response, towards_hz),
+        displacement=dwell_analysis.settled_envelope(drawn.response),
+        terminal=dwell_analysis.terminal_levels(drawn.response, towards_hz),
         difference=_sine_difference(drawn, measured),
         prediction=predict(
             drawn.run.specimen,
@@ -437,9 +426,7 @@ def stepped_overlay(analysis: SteppedSineAnalysis, drawn: DrawSet[SteppedRespons
     """Compare the measured responses of all steps with the draws."""
     measured = analysis.response
     return SteppedSineOverlay(
-        run=drawn.run,
-        response=drawn.response,
-        ensemble=drawn.ensemble,
+        **columns(drawn, "run response ensemble"),
         escape=None,
         difference=_sine_difference(drawn, measured),
         prediction=predict(drawn.run.specimen, measured.frequency_hz, measured.drive_amplitude_m),

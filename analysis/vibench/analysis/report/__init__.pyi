@@ -1,10 +1,5 @@
 from ._chain import chain_figure as chain_figure
-from ._choices import (
-    SHOWN as SHOWN,
-    ImageKind as ImageKind,
-    Table as Table,
-    table as table,
-)
+from ._choices import SHOWN as SHOWN, ImageKind as ImageKind, Table as Table, table as table
 from ._comparison import write_comparison as write_comparison
 from ._drawings import (
     DRAWINGS as DRAWINGS,

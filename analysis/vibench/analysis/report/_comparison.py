@@ -75,7 +75,10 @@ def comparison_figure(
             for axes in panels:
                 axes.axvline(marker_hz, color=style.BOUNDS, linewidth=0.8, linestyle="-.")
         panels[-1].set_xlabel("frequency [Hz]")
-        style.frequency_axis(top, *_span(curves))
+        low_hz = min(float(np.min(each.frequency_hz)) for each in curves)
+        high_hz = max(float(np.max(each.frequency_hz)) for each in curves)
+        margin = 0.0 if high_hz > low_hz else _SINGLE_BAND
+        style.frequency_axis(top, low_hz * (1 - margin), high_hz * (1 + margin))
         style.legend_above(figure, [top], columns=2)
         figure.align_ylabels()
     return style.DrawnFigure(
@@ -109,12 +112,6 @@ def _heights(curves: Sequence[Curve]) -> tuple[float, float]:
     known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in curves])
     positive = known[known > 0]
     return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
-
-
-def _span(curves: Sequence[Curve]) -> tuple[float, float]:
-    low = min(float(np.min(each.frequency_hz)) for each in curves)
-    high = max(float(np.max(each.frequency_hz)) for each in curves)
-    return (low, high) if high > low else (low * (1 - _SINGLE_BAND), high * (1 + _SINGLE_BAND))
 
 
 def comparison_caption(curves: Sequence[Curve], pair: Pair | None) -> str:

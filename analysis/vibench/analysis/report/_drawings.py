@@ -13,14 +13,7 @@ from vibench.sim import Specimen
 
 from ..chaos.verdict import MotionKind
 from ..frequency_response.modal_fit import Resonance
-from ..kinds import (
-    AnyResult,
-    DwellResult,
-    NoiseResult,
-    Result,
-    SteppedSineResult,
-    SweepResult,
-)
+from ..kinds import AnyResult, DwellResult, NoiseResult, Result, SteppedSineResult, SweepResult
 from ..overlay.draws import CLOCK_TOLERANCE
 from ..overlay.overlay import (
     PAPER_RESONANCES_HZ,
@@ -437,7 +430,7 @@ def _noise_figures(noise: NoiseResult) -> Iterator[DrawnFigure]:
 
 
 def _noise_levels(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
-    from ..frequency_response.scan import scans_of  # noqa: PLC0415 - as above
+    from ..results.spectral_functions import scans_of  # noqa: PLC0415 - as above
     from ._transmission import scan_figure, transmission_levels_figure  # noqa: PLC0415 - as above
 
     for scan in scans_of([each.analysis for each in noise]):

@@ -85,7 +85,12 @@ def branches_figure(
         _events(panels[1], diagram)
         if diagram.request.loop_time_s is not None and holdable is not None:
             _growth(panels[2], diagram, holdable, least_growth_time_s(diagram.request.loop_time_s))
-        _label_x_axis(panels[-1], diagram)
+        start, stop = diagram.request.start, diagram.request.stop
+        if diagram.request.along is Parameter.FREQUENCY:
+            panels[-1].set_xlabel("drive frequency [Hz]")
+            style.frequency_axis(panels[-1], start, stop)
+        else:
+            panels[-1].set(xlabel="base amplitude A0 [µm]", xlim=(1e6 * start, 1e6 * stop))
         style.legend_above(figure, list(panels), columns=4)
         figure.align_ylabels()
     return style.DrawnFigure(
@@ -180,15 +185,6 @@ def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) 
         colour = style.SIMULATED if is_simulated else style.MEASURED
         label = style.plain_label(f"{curve.source}, {curve.origin.value}")
         axes.plot(curve.frequency_hz, curve.magnitude, ".", color=colour, alpha=0.7, label=label)
-
-
-def _label_x_axis(axes: Axes, diagram: BranchDiagram) -> None:
-    request = diagram.request
-    if request.along is Parameter.FREQUENCY:
-        axes.set_xlabel("drive frequency [Hz]")
-        style.frequency_axis(axes, request.start, request.stop)
-        return
-    axes.set(xlabel="base amplitude A0 [µm]", xlim=(1e6 * request.start, 1e6 * request.stop))
 
 
 def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:

@@ -18,13 +18,14 @@ from vibench.acquisition.plan import (
 
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
 from ..signals import Flags, Reals
-from ..sine.jumps import hysteresis_vpp, level_jumps
 from ..sine.stepped_response import (
     SteppedResponse,
     SteppedSineAnalysis,
     TrackedResonance,
     backbone_sentence,
     feedback_sentences,
+    hysteresis_vpp,
+    level_jumps,
     lost_levels,
     noted_jumps,
     tracked_resonances,
@@ -191,7 +192,11 @@ def backbone_figure(
     base = np.array([each.base_m_per_s2 for each in levels])
     simulated_m = _simulated_m(levels, analysis, overlay)
     lost = lost_levels(analysis.facts.feedback)
-    drawn = rows(_interrupt(levels, lost), _COLUMNS)
+    # NaN at the levels without a resonance interrupts the lines there.
+    nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
+    gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
+    interrupted = sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
+    drawn = rows(interrupted, _COLUMNS)
     scale, unit = style.with_prefix(float(np.nanmax(drawn["amplitude_m"], initial=0.0)), "m")
     size = scale * drawn["amplitude_m"]
     with style.drawing(_BACKBONE_HEIGHT_IN) as figure:
@@ -232,13 +237,6 @@ def backbone_figure(
         figure=figure,
         tables=(table(name, **columns),),
     )
-
-
-def _interrupt(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
-    """Insert NaN at the levels without a resonance, so that lines are interrupted there."""
-    nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
-    gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
-    return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
 
 
 def _frequencies(axes: Axes, drawn: Mapping[str, Reals]) -> None:

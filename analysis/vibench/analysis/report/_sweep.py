@@ -7,9 +7,8 @@ from numpy.typing import ArrayLike
 
 from ..overlay.overlay import RESPONSE_I, RESPONSE_II, SweepOverlay
 from ..signals import Reals
-from ..sine.jumps import Jump, hysteresis
 from ..sine.sweep import SweepResponse
-from ..sine.sweep_analysis import Collisions, SweepAnalysis
+from ..sine.sweep_analysis import Collisions, Jump, SweepAnalysis, hysteresis
 from ..tables import Table, columns, plus_minus, table
 from ..tones import order_label
 from . import _style as style

@@ -8,17 +8,12 @@ from numpy.typing import ArrayLike
 
 from vibench.sim import Specimen, base_transmissibility
 
-from ..frequency_response.noise_response import (
-    Distortion,
-    NoiseAnalysis,
-    NoiseResponse,
-    distortion,
-)
+from ..frequency_response.noise_response import Distortion, NoiseAnalysis, NoiseResponse, distortion
 from ..frequency_response.periodic import PeriodicFrequencyResponse
 from ..frequency_response.results import MagnitudeScale
-from ..frequency_response.scan import Scan
 from ..overlay.overlay import TRANSMISSION, NoiseOverlay
 from ..recordings.facts import specimen_of
+from ..results.spectral_functions import Scan
 from ..signals import Reals
 from ..tables import Table, columns, plus_minus, table
 from . import _style as style
@@ -276,23 +271,19 @@ def scan_figure(scan: Scan) -> style.DrawnFigure:
         phases.set_xticks(shown, [names[place] for place in shown])
         phases.set_xlabel("point" if few else "node")
         style.legend_above(figure, [magnitudes], columns=4)
+    where = ", ".join(f"{each.frequency_hz:.1f}" for each in scan.shapes)
+    confidence = scan.analyses[0].response.frequency_response.settings.confidence
     return style.DrawnFigure(
         name=f"scan_{scan.analyses[0].facts.name}",
         title=f"Scan {scan.name}: shapes at the resonances",
-        caption=scan_caption(scan),
+        caption=(
+            f"Measured transmission from base to {len(scan.points)} points, and its phase, at "
+            f"{f'the resonances {where} Hz' if where else 'no resonance, because none is significant'}. "
+            f"Values and bars ({100 * confidence:g} % bounds): at the spectral line nearest to each "
+            "resonance."
+        ),
         figure=figure,
         tables=(table(f"scan_{scan.analyses[0].facts.name}", **columns),),
-    )
-
-
-def scan_caption(scan: Scan) -> str:
-    """Return the caption with the resonances and the meaning of the bars."""
-    where = ", ".join(f"{each.frequency_hz:.1f}" for each in scan.shapes)
-    confidence = scan.analyses[0].response.frequency_response.settings.confidence
-    return (
-        f"Measured transmission from base to {len(scan.points)} points, and its phase, at "
-        f"{f'the resonances {where} Hz' if where else 'no resonance, because none is significant'}. "
-        f"Values and bars ({100 * confidence:g} % bounds): at the spectral line nearest to each resonance."
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from vibench.acquisition.plan import CHECK_QUIET_S
 from vibench.acquisition.recording import SegmentLabel
 
+from .. import tones
 from ..chaos.verdict import LARGEST_NOISE, SMALL, STEADY
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import RecordedChannels, far_from
@@ -25,20 +26,6 @@ from ..signals import (
 )
 from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
 from ..tables import Tabular
-from ..tones import (
-    ALL_ORDERS,
-    HIGHEST_ORDER,
-    DriveLevel,
-    TrackedOrders,
-    cycles_needed,
-    drive_level,
-    largest_peak,
-    noise_lift,
-    order_label,
-    order_turns,
-    steady_phase,
-    track_signals,
-)
 
 NOTHING: Reals = np.empty(0)
 _EXPLAINED = 1.5
@@ -268,7 +255,7 @@ class DwellResponse(Tabular):
         "response_ii sd_response_ii slow_change phase_rad sd_phase_rad lines"
     )
 
-    drive: DriveLevel
+    drive: tones.DriveLevel
     window_s: float
     response_i: float
     """Largest |x| over the window, divided by the drive amplitude."""
@@ -332,7 +319,7 @@ def dwell_response(
     near_hz: float,
     window_s: float = 5.0,
     towards_hz: tuple[float, ...] = (),
-    orders: tuple[float, ...] = ALL_ORDERS,
+    orders: tuple[float, ...] = tones.ALL_ORDERS,
     delay_s: float = 0.0,
     sensors: complex = 1.0,
     silence: Reals = NOTHING,
@@ -366,13 +353,13 @@ def dwell_response(
     window = _window(
         response.size, disturbed_samples(sample_rate_hz, LOWEST_ORDER * near_hz), sample_rate_hz, window_s
     )
-    level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
+    level = tones.drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
     if level.frequency_hz > _BAND_ABOVE * sample_rate_hz:
         raise UnusableData(
             f"{sample_rate_hz:.6g} samples/s are too few for a sine at {level.frequency_hz:.6g} Hz; at least "
             f"{1 / _BAND_ABOVE:.2g} samples per period are needed: record with a higher sample rate"
         )
-    highest = HIGHEST_ORDER * sample_rate_hz / level.frequency_hz
+    highest = tones.HIGHEST_ORDER * sample_rate_hz / level.frequency_hz
     orders = tuple(order for order in orders if order <= highest)
     displacement = converted_signal(
         response,
@@ -384,15 +371,15 @@ def dwell_response(
         lines_hz=[order * level.frequency_hz for order in orders],
     )
     is_clear = _clear(bridged, displacement, near_hz, window)
-    phase = steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
+    phase = tones.steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
     motion = displacement.samples[window]
-    whole, base_whole, repeating = track_signals(
+    whole, base_whole, repeating = tones.track_signals(
         (response[window], base[window], motion), phase, interval_samples=motion.size, orders=orders
     )
     # Fit tenths of the window; in a short window, fewer parts. The scatter of the parts includes all changes.
     cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
-    blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
-    parts, base_parts = track_signals(
+    blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * tones.cycles_needed(orders)))))
+    parts, base_parts = tones.track_signals(
         (response[window], base[window]), phase, interval_samples=phase.size // blocks, orders=orders
     )
     omega = 2 * np.pi * level.frequency_hz
@@ -405,16 +392,16 @@ def dwell_response(
     level = replace(level, sd_amplitude_m=of_base_m)
     noise_density, sensor = _sensor_noise(response, displacement)
     silent = background_in_silence(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
-    repeated = np.asarray(np.real(repeating.value[:, 0] @ np.stack(order_turns(phase, orders))))
+    repeated = np.asarray(np.real(repeating.value[:, 0] @ np.stack(tones.order_turns(phase, orders))))
     rest = background_between_lines(motion - repeated, sample_rate_hz)
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
     most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * larger_noise(silent, sensor).rms_m)
     rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
     repeated = sizes_with_maxima(repeated)
-    rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
+    rest_lift = tones.noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
     # If the non-repeating part is only noise, the motion equals the repeating part.
     moved = repeated if noise.source == BETWEEN else motion
-    lift = noise_lift(moved, noise.rms_m, 2 * noise.frequency_hz * window_s)
+    lift = tones.noise_lift(moved, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
     spectrum = spectrum.convert(Quantity.VELOCITY, Quantity.DISPLACEMENT)
     return DwellResponse(
@@ -501,8 +488,8 @@ def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float
 
 
 def _lines(
-    whole: TrackedOrders,
-    parts: TrackedOrders,
+    whole: tones.TrackedOrders,
+    parts: tones.TrackedOrders,
     drive_hz: float,
     spectrum: AmplitudeSpectrum,
     towards_hz: tuple[float, ...],
@@ -514,9 +501,9 @@ def _lines(
         size = float(whole.amplitude[index, 0])
         spread = standard_uncertainty(parts.value[index])
         level = _decibel(size / order, reference)
-        yield Line(order_label(order), drive_hz * order, size / omega, spread / omega, level)
+        yield Line(tones.order_label(order), drive_hz * order, size / omega, spread / omega, level)
     for target in towards_hz:
-        if (peak := largest_peak(spectrum, 0.9 * target, 1.1 * target)) is not None:
+        if (peak := tones.largest_peak(spectrum, 0.9 * target, 1.1 * target)) is not None:
             level = _decibel(peak.amplitude, reference / (2 * np.pi * drive_hz))
             yield Line(f"peak towards {target:g} Hz", peak.frequency_hz, peak.amplitude, peak.floor, level)
 

@@ -1,9 +1,10 @@
-"""Responses I and II at every frequency of a stepped sine."""
+"""Responses I and II at every step of a stepped sine, and jumps between levels."""
 
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import sqrt
 from statistics import fmean
 from typing import ClassVar
@@ -11,13 +12,7 @@ from typing import ClassVar
 import numpy as np
 import scipy
 
-from vibench.acquisition.plan import (
-    HeldResponse,
-    ResonanceTracking,
-    SettledSine,
-    SteppedLevel,
-    SteppedSine,
-)
+from vibench.acquisition.plan import HeldResponse, ResonanceTracking, SettledSine, SteppedLevel, SteppedSine
 from vibench.acquisition.recording import (
     FeedbackNote,
     Hold,
@@ -333,3 +328,74 @@ def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
     if abs(shift_hz) <= u_hz:
         return f"{between} {moved}: neither softening nor hardening is significant."
     return f"{between} {moved}: the mode {'hardens' if shift_hz > 0 else 'softens'}."
+
+
+JUMP_FACTOR = 2.0
+"""Minimum ratio of Response II at two levels that counts as a jump; for a linear specimen the ratio is 1."""
+
+_UNSTEADY = 0.05
+"""Relative uncertainty of Response II above which a step may contain two motions; NaN counts as above."""
+
+
+@dataclass(frozen=True)
+class LevelJump:
+    """Jump of Response II between two consecutive levels."""
+
+    direction: str
+    """``"up"`` or ``"down"``: direction in which the level is stepped."""
+    before_vpp: float
+    after_vpp: float
+    factor: float
+    """Response II after the jump divided by Response II before the jump."""
+
+
+def level_jumps(response: SteppedResponse) -> tuple[LevelJump, ...]:
+    """Return the jumps of a stepped level in the order of time, except across a turning point.
+
+    If the motion jumps during a step, its response is a mean of two motions. Such a step is skipped, and the
+    steps before and after it are compared.
+    """
+    levels, sizes = response.amplitude_vpp.tolist(), response.response_ii.tolist()
+    steps = list(zip(response.direction, levels, sizes, strict=True))
+    steady = response.sd_response_ii < _UNSTEADY * response.response_ii
+    for place in range(len(steps) - 2, 0, -1):
+        (way, *_, before), (_, *_, now), (other, *_, after) = steps[place - 1 : place + 2]
+        if not steady[place] and way == other and min(before, after) < now < max(before, after):
+            del steps[place]
+    found = []
+    for (way, before_vpp, before), (other, after_vpp, after) in pairwise(steps):
+        if way == other and before > 0 and not 1 / JUMP_FACTOR <= after / before <= JUMP_FACTOR:
+            found.append(LevelJump(way, before_vpp, after_vpp, after / before))
+    return tuple(found)
+
+
+def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
+    """Return the bounds of the difference: level of the jump up minus level of the jump down [V].
+
+    Returns None unless there are jumps in both directions.
+    """
+    rises = [each for each in jumps if each.direction == "up" and each.factor > 1]
+    falls = [each for each in jumps if each.direction == "down" and each.factor < 1]
+    if not rises or not falls:
+        return None
+    rise, fall = rises[0], falls[-1]
+    return rise.before_vpp - fall.before_vpp, rise.after_vpp - fall.after_vpp
+
+
+@dataclass(frozen=True, eq=False)
+class SteppedLevelAnalysis(SteppedSineAnalysis):
+    """Results of a stepped level, with the jumps of its response."""
+
+    DOCUMENT: ClassVar = (
+        f"{SteppedSineAnalysis.DOCUMENT} amplitude_vpp=response.amplitude_vpp jumps hysteresis_vpp"
+    )
+
+    @property
+    def jumps(self) -> tuple[LevelJump, ...]:
+        """Jumps in the order of time."""
+        return level_jumps(self.response)
+
+    @property
+    def hysteresis_vpp(self) -> tuple[float, float] | None:
+        """Bounds of the difference: level of the jump up minus level of the jump down [V]."""
+        return hysteresis_vpp(self.jumps)

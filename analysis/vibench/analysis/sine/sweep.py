@@ -25,15 +25,7 @@ from ..signals import (
     disturbed_samples,
 )
 from ..tables import Tabular
-from ..tones import (
-    ALL_ORDERS,
-    ORDERS,
-    TrackedOrders,
-    cycles_needed,
-    noise_lift,
-    track_orders,
-    track_signals,
-)
+from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_lift, track_orders, track_signals
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
