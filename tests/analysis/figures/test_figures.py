@@ -21,9 +21,8 @@ from vibench.analysis import Simulation
 from vibench.analysis.recordings.checks import measurement_checks
 from vibench.analysis.report._drawings import sweep_findings
 from vibench.analysis.report._dwells import dwells_figure, spectrum_columns
-from vibench.analysis.report._recording import bench_levels_figure, excitation_figure
 from vibench.analysis.report._stepped_sine import STEPPED_FREQUENCIES, stepped_sine_figure
-from vibench.analysis.report._style import SIMULATED, with_prefix
+from vibench.analysis.report._style import SIMULATED, bench_levels_figure, excitation_figure, with_prefix
 from vibench.analysis.report._sweep import regions_text, sweep_figure
 from vibench.analysis.report._transmission import transmission_figure, transmission_levels_figure
 from vibench.analysis.results.campaign_results import result_of

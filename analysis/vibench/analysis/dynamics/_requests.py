@@ -14,30 +14,8 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
+from vibench import sim
 from vibench.acquisition import ChosenFrom
-from vibench.sim import (
-    CONTACT_LAWS,
-    USUAL_SPECIMEN,
-    Accuracy,
-    AmplitudePath,
-    BalanceOptions,
-    DampingTime,
-    DrivePath,
-    FrequencyPath,
-    FrozenModel,
-    Harmonic,
-    HarmonicSet,
-    Parameter,
-    PhaseReference,
-    PowerLaw,
-    RigidStops,
-    Specimen,
-    SpecimenTable,
-    count_text,
-    load_specimen,
-    lyapunov_spectrum,
-    shipped_specimens,
-)
 from vibench.sim.branches import MotionSearch
 from vibench.sim.chain import MOST_CELLS, Chain
 from vibench.sim.study import TargetError, TargetTime, frequency_range
@@ -45,7 +23,7 @@ from vibench.sim.study import TargetError, TargetTime, frequency_range
 from ..signals import Reals
 from ..tables import Tabular, columns
 
-ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CONTACT_LAWS.values())])]
+ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in sim.CONTACT_LAWS.values())])]
 
 
 def _field_error(field: str, error: ValueError) -> ValidationError:
@@ -54,20 +32,20 @@ def _field_error(field: str, error: ValueError) -> ValidationError:
     return ValidationError.from_exception_data(field, [{"type": kind, "loc": (field,), "input": None}])
 
 
-class SpecimenChoice(FrozenModel):
+class SpecimenChoice(sim.FrozenModel):
     """A specimen, optionally with another contact, damping or gap."""
 
-    specimen: Annotated[str, ChosenFrom(shipped_specimens)] = USUAL_SPECIMEN
+    specimen: Annotated[str, ChosenFrom(sim.shipped_specimens)] = sim.USUAL_SPECIMEN
     """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, two_masses (`vibench specimen`
     describes each), or the path of a specimen's file."""
     model: ContactWord = ""
     """Contact law: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...
     (`vibench specimen` describes each); the specimen's own if not given."""
-    damping_time_s: DampingTime | None = None
+    damping_time_s: sim.DampingTime | None = None
     """Ratio of damping to stiffness of every link, c_i / k_i; the specimen's own values if not given."""
     gap_m: PositiveFloat | None = None
     """Clearance at both stops; the specimen's own if not given."""
-    described: SpecimenTable | None = None
+    described: sim.SpecimenTable | None = None
     """All values of the specimen, stored with the result; read from the specimen's file by default."""
 
     @model_validator(mode="after")
@@ -76,7 +54,7 @@ class SpecimenChoice(FrozenModel):
         found = self.described
         if found is None:
             try:
-                found = SpecimenTable.model_validate(load_specimen(self.specimen).model_dump())
+                found = sim.SpecimenTable.model_validate(sim.load_specimen(self.specimen).model_dump())
             except ValueError as error:
                 raise _field_error("specimen", error) from error
             object.__setattr__(self, "described", found)
@@ -91,11 +69,11 @@ class SpecimenChoice(FrozenModel):
         return self
 
     @property
-    def chosen_specimen(self) -> Specimen:
+    def chosen_specimen(self) -> sim.Specimen:
         """The specimen with the chosen contact law, damping and gap."""
         return self.specimen_under(self.law)
 
-    def specimen_under(self, model: str) -> Specimen:
+    def specimen_under(self, model: str) -> sim.Specimen:
         """Build the specimen with another contact law."""
         assert self.described is not None, "validation fills it"
         return self.described.specimen(model, self.damping_time_s, self.gap_m)
@@ -144,7 +122,7 @@ class BranchRequest(SpecimenChoice):
 
     method: BranchMethod = BranchMethod.SHOOTING
     """Shooting (exact), harmonic balance, or first order (one harmonic: eq. 5 of the paper)."""
-    along: Parameter = Parameter.FREQUENCY
+    along: sim.Parameter = sim.Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement when the frequency varies."""
@@ -172,7 +150,7 @@ class BranchRequest(SpecimenChoice):
     """Seed of the random initial states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
     """Two frequencies [Hz] around a mode whose phase resonance is followed while the amplitude varies."""
-    phase_of: PhaseReference = PhaseReference.RELATIVE
+    phase_of: sim.PhaseReference = sim.PhaseReference.RELATIVE
     """Motion of m0 that lags the base by a quarter of a period at the phase resonance."""
     loop_time_s: PositiveFloat | None = None
     """Latency of the bench's feedback loop [s], which limits the unstable motions that the bench can hold."""
@@ -186,12 +164,12 @@ class BranchRequest(SpecimenChoice):
                 f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower value first"
             )
         law = self.chosen_specimen.contact
-        if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
+        if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, sim.PowerLaw):
             raise ValueError(
                 f"one harmonic cannot describe {self.law}: choose a power law such as power:5, or the "
                 "method 'balance' or 'shooting'"
             )
-        if self.method is BranchMethod.BALANCE and isinstance(law, RigidStops):
+        if self.method is BranchMethod.BALANCE and isinstance(law, sim.RigidStops):
             raise ValueError(
                 "harmonic balance needs a finite contact force, and rigid stops have none; choose "
                 "the method 'shooting'"
@@ -203,13 +181,13 @@ class BranchRequest(SpecimenChoice):
             )
         self._refuse_other_resonances()
         pairs = self.recorded_level
-        if pairs and self.along is Parameter.AMPLITUDE:
+        if pairs and self.along is sim.Parameter.AMPLITUDE:
             raise ValueError(
                 "a recorded level needs branches along frequency; along amplitude, give one frequency"
             )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
-        Harmonic(*self.path.drive(self.stop))  # raises an error if the drive is impossible
+        sim.Harmonic(*self.path.drive(self.stop))  # raises an error if the drive is impossible
         return self
 
     def _refuse_other_resonances(self) -> None:
@@ -220,21 +198,21 @@ class BranchRequest(SpecimenChoice):
             raise ValueError(f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; swap the two ends")
         lower, upper = self.chosen_specimen.gaps_m
         followed = self.along, self.method, self.time_s
-        if followed != (Parameter.AMPLITUDE, BranchMethod.SHOOTING, None) or lower != upper:
+        if followed != (sim.Parameter.AMPLITUDE, BranchMethod.SHOOTING, None) or lower != upper:
             raise ValueError(
                 "a phase resonance is followed along amplitude, by shooting, with two equal stops and no "
                 "time limit; give a range of amplitudes and a specimen with one gap, and leave out the time"
             )
 
     @property
-    def path(self) -> DrivePath:
+    def path(self) -> sim.DrivePath:
         """Path in frequency and amplitude along which branches are followed."""
-        if self.along is Parameter.AMPLITUDE:
-            return AmplitudePath(self.frequency_hz)
+        if self.along is sim.Parameter.AMPLITUDE:
+            return sim.AmplitudePath(self.frequency_hz)
         if self.recorded_level:
             frequencies_hz, amplitudes_m = zip(*self.recorded_level, strict=True)
-            return FrequencyPath(amplitudes_m, frequencies_hz)
-        return FrequencyPath((self.amplitude_m,))
+            return sim.FrequencyPath(amplitudes_m, frequencies_hz)
+        return sim.FrequencyPath((self.amplitude_m,))
 
     @property
     def search(self) -> MotionSearch:
@@ -248,12 +226,12 @@ class BranchRequest(SpecimenChoice):
         )
 
     @property
-    def balance_options(self) -> BalanceOptions:
+    def balance_options(self) -> sim.BalanceOptions:
         """Options of harmonic balance."""
         lower, upper = self.chosen_specimen.gaps_m
-        kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
+        kept = sim.HarmonicSet.ODD if lower == upper else sim.HarmonicSet.ALL
         most = 1 if self.method is BranchMethod.FIRST_ORDER else self.harmonics
-        return BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=self.error or EXACT_ENOUGH)
+        return sim.BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=self.error or EXACT_ENOUGH)
 
     @property
     def title(self) -> str:
@@ -262,7 +240,7 @@ class BranchRequest(SpecimenChoice):
         if self.resonance_band_hz is not None:
             low_hz, high_hz = self.resonance_band_hz
             return f"{self.law}, {self.phase_of.value} phase resonance between {low_hz:g} and {high_hz:g} Hz"
-        if self.along is Parameter.AMPLITUDE:
+        if self.along is sim.Parameter.AMPLITUDE:
             where = f"{self.frequency_hz:g} Hz"
         elif self.recorded_level:
             where = "recorded level"
@@ -299,7 +277,7 @@ class ChainDrive(StrEnum):
 class ChainRequest(SpecimenChoice):
     """A chain under one kind of drive; the repeating unit consists of the specimen and any `others`."""
 
-    others: tuple[SpecimenTable, ...] = ()
+    others: tuple[sim.SpecimenTable, ...] = ()
     """Further specimens in the unit of the chain, after the first."""
     lengths: Annotated[tuple[Annotated[int, Field(ge=1, le=MOST_CELLS)], ...], Field(min_length=1)] = (8,)
     """Number of cells; give several numbers to study chains of different lengths."""
@@ -321,7 +299,7 @@ class ChainRequest(SpecimenChoice):
     """Settling time from rest under a steady sine, before the observation."""
     exponent_s: NonNegativeFloat = 0.0
     """Averaging time of the largest Lyapunov exponent under a steady sine; 0 to omit the exponent."""
-    accuracy: Accuracy = Accuracy.STANDARD
+    accuracy: sim.Accuracy = sim.Accuracy.STANDARD
     """Accuracy of contacts; flight is exact at every accuracy."""
     error: TargetError | None = None
     """Target relative error of transmissions under a steady sine, such as 0.01 or "1 %"; determines the
@@ -332,7 +310,7 @@ class ChainRequest(SpecimenChoice):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         self.chain(max(self.lengths))
-        Harmonic(self.start_hz, self.amplitude_m)  # raises an error if the drive is impossible
+        sim.Harmonic(self.start_hz, self.amplitude_m)  # raises an error if the drive is impossible
         self._refuse_beside_target()
         if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
             raise ValueError(
@@ -384,7 +362,7 @@ class ChainRequest(SpecimenChoice):
     @property
     def title(self) -> str:
         """Title of the chain request for figures."""
-        cells = ", ".join([*map(str, self.lengths[:-1]), count_text(self.lengths[-1], "cell")])
+        cells = ", ".join([*map(str, self.lengths[:-1]), sim.count_text(self.lengths[-1], "cell")])
         match self.drive:
             case ChainDrive.NONE:
                 return f"{cells} without contact"
@@ -420,7 +398,7 @@ ELASTIC = ("hertz", "linear", "linear_gap", "power")
 class SpectrumRequest(SpecimenChoice):
     """Request for all Lyapunov exponents at every frequency or level."""
 
-    along: Parameter = Parameter.FREQUENCY
+    along: sim.Parameter = sim.Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement when the frequency varies."""
@@ -432,7 +410,7 @@ class SpectrumRequest(SpecimenChoice):
     """Upper end of the range of frequencies [Hz] or amplitudes [m]."""
     step: PositiveFloat = 10.0
     """Step between points of the range, in Hz or in m."""
-    accuracy: Accuracy = Accuracy.REFERENCE
+    accuracy: sim.Accuracy = sim.Accuracy.REFERENCE
     """Accuracy of contacts and of the sum of the exponents."""
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] = 25.0
     """Averaging time of the exponents."""
@@ -446,7 +424,7 @@ class SpectrumRequest(SpecimenChoice):
         points = len(self.values)
         if points > MOST_POINTS:
             raise ValueError(f"{points} points were requested; at most {MOST_POINTS}: take a larger step")
-        Harmonic(*self.drive(self.stop))  # raises an error if the drive is impossible
+        sim.Harmonic(*self.drive(self.stop))  # raises an error if the drive is impossible
         return self
 
     @property
@@ -456,7 +434,7 @@ class SpectrumRequest(SpecimenChoice):
 
     def drive(self, value: float) -> tuple[float, float]:
         """Return frequency [Hz] and amplitude [m] for a value of the varied parameter."""
-        if self.along is Parameter.FREQUENCY:
+        if self.along is sim.Parameter.FREQUENCY:
             return value, self.amplitude_m
         return self.frequency_hz, value
 
@@ -464,12 +442,12 @@ class SpectrumRequest(SpecimenChoice):
     def is_elastic(self) -> bool:
         """Whether the contact dissipates no energy."""
         law = self.chosen_specimen.contact
-        return isinstance(law, PowerLaw) or law.kind in ELASTIC
+        return isinstance(law, sim.PowerLaw) or law.kind in ELASTIC
 
     @property
     def title(self) -> str:
         """Title of the spectrum request for figures."""
-        is_level = self.along is Parameter.AMPLITUDE
+        is_level = self.along is sim.Parameter.AMPLITUDE
         fixed = f"{self.frequency_hz:g} Hz" if is_level else f"{1e6 * self.amplitude_m:g} µm"
         return f"{self.law}, {fixed}"
 
@@ -553,7 +531,7 @@ class ExponentSpectrum(Tabular):
         else:
             check = f"sums of exponents differ from the damping rate {self.points[0].dampers_per_s:.6g} 1/s "
             check += f"by at most {self.largest_sum_difference:.1g} of this value"
-        points = count_text(len(self.points), "point")
+        points = sim.count_text(len(self.points), "point")
         return f"{points} in {self.elapsed_s:.1f} s, {chaotic} chaotic while observed; {check}."
 
 
@@ -562,8 +540,8 @@ def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
     specimen = request.chosen_specimen
     for value in request.values:
         began = time.perf_counter()
-        drive = Harmonic(*request.drive(value))
-        found = lyapunov_spectrum(specimen, drive, request.accuracy, request.duration_s, request.settle_s)
+        drive = sim.Harmonic(*request.drive(value))
+        found = sim.lyapunov_spectrum(specimen, drive, request.accuracy, request.duration_s, request.settle_s)
         elapsed_s = time.perf_counter() - began
         low_per_s, high_per_s = found.intervals_per_s(request.confidence).T.tolist()
         dimension, low, high = found.dimension, *found.dimension_interval(request.confidence)

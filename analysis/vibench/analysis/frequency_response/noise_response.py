@@ -26,6 +26,7 @@ from ..signals import (
 from ..spectra import DensitySums
 from ..tables import Tabular, columns
 from ..tones import NoiseDriveLevel, noise_drive_level
+from . import transmissibility
 from .modal_fit import SMALLEST_RELATIVE_SD, Resonance
 from .periodic import Drift, PeriodicFrequencyResponse, PeriodicSums, Repetition
 from .resonance import resonances, scattered_resonances
@@ -36,17 +37,6 @@ from .results import (
     FrequencyResponseSettings,
     FrequencyResponseView,
     converted_frequency_response,
-)
-from .transmissibility import (
-    FrequencyResponseSums,
-    Hits,
-    HitSpectra,
-    coherence,
-    find_hits,
-    hit_spectra,
-    least_squares,
-    with_assumed_scatter,
-    without_bounds,
 )
 
 
@@ -331,8 +321,8 @@ def _least_squares(
     s_xx = np.sum(np.abs(motion[:, 0]) ** 2, axis=0)
     s_yy = np.sum(np.abs(motion[:, 1]) ** 2, axis=0)
     s_xy = np.sum(np.conj(motion[:, 0]) * motion[:, 1], axis=0)
-    value = least_squares(estimator, s_xx, s_yy, s_xy, noise_ratio)
-    agreement = coherence(s_xx, s_yy, s_xy)
+    value = transmissibility.least_squares(estimator, s_xx, s_yy, s_xy, noise_ratio)
+    agreement = transmissibility.coherence(s_xx, s_yy, s_xy)
     spread = relative_sd(np.maximum(agreement, np.finfo(float).tiny), like.n_eff)
     result = replace(
         like,
@@ -356,7 +346,7 @@ def streamed_response(
     rate = channels.sample_rate_hz
     stretch = only_stretch(channels, SegmentLabel.NOISE)
     band = (noise.band_start_hz, noise.band_stop_hz)
-    hits = find_hits(channels, stretch, band, request.segment_s)
+    hits = transmissibility.find_hits(channels, stretch, band, request.segment_s)
     if hits is not None:
         return _response_to_hits(channels, hits, band, request)
     segment = request.segment_samples(stretch.samples, rate)
@@ -366,7 +356,7 @@ def streamed_response(
             f"segment must contain a period of {noise.band_start_hz:g} Hz: request fewer averages, or "
             "measure longer"
         )
-    sums = FrequencyResponseSums(
+    sums = transmissibility.FrequencyResponseSums(
         FrequencyResponseSettings(
             Estimator.DRIVE, rate, segment, request.window, request.overlap, request.confidence
         )
@@ -417,7 +407,10 @@ def _switching(energy: Reals) -> str:
 
 
 def _response_to_hits(
-    channels: RecordedChannels, hits: Hits, band_hz: tuple[float, float], request: FrequencyResponseRequest
+    channels: RecordedChannels,
+    hits: transmissibility.Hits,
+    band_hz: tuple[float, float],
+    request: FrequencyResponseRequest,
 ) -> NoiseResponse:
     rate, size, bad = channels.sample_rate_hz, hits.segment_samples, _Unusable()
     usable = []
@@ -429,10 +422,12 @@ def _response_to_hits(
         raise NotEnoughData(f"all {len(hits.starts)} hits have a fault{bad.text}; measure again")
     data = np.array(usable)
     settings = FrequencyResponseSettings(request.estimator, rate, size, "", 0.0, request.confidence)
-    spectra = hit_spectra(data, hits, settings, band_hz[1], fades=request.window is not Window.BOXCAR)
+    spectra = transmissibility.hit_spectra(
+        data, hits, settings, band_hz[1], fades=request.window is not Window.BOXCAR
+    )
     decay_per_s = spectra.settings.decay_per_s or 0.0
 
-    def estimate_by(estimator: Estimator, given: HitSpectra = spectra) -> FrequencyResponse:
+    def estimate_by(estimator: Estimator, given: transmissibility.HitSpectra = spectra) -> FrequencyResponse:
         noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
         found = given.response(estimator, noise_ratio).without_delay(channels.response_delay_s)
         inside = found.between(*band_hz)
@@ -579,8 +574,8 @@ def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
     low, high = float(frequency_response.frequency_hz[0]), float(frequency_response.frequency_hz[-1])
     if frequency_response.n_eff > 1:
         return resonances(frequency_response, low_hz=low, high_hz=high)
-    found = resonances(with_assumed_scatter(frequency_response), low_hz=low, high_hz=high)
-    return tuple(without_bounds(each) for each in found)
+    found = resonances(transmissibility.with_assumed_scatter(frequency_response), low_hz=low, high_hz=high)
+    return tuple(transmissibility.without_bounds(each) for each in found)
 
 
 _QUIET_S = 0.05

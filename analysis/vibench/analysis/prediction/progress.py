@@ -36,16 +36,8 @@ from vibench.sim.study import (
     frequency_range,
 )
 
+from .. import dynamics
 from ..comparison import Curve, CurveKind, CurveOrigin
-from ..dynamics import (
-    BranchLine,
-    ChainRun,
-    ContactWord,
-    SpecimenChoice,
-    SpectrumPoint,
-    map_caption,
-    motion_classes,
-)
 from ..errors import AnalysisError
 from ..overlay.similarity import Similarity, SimilarityCurve, similarity
 from ..signals import Reals, runs_of
@@ -57,7 +49,7 @@ MOST_CELLS = 200_000
 """Maximum number of map cells in a window; compute larger maps with `vibench map` and open them."""
 
 
-class MapRequest(SpecimenChoice):
+class MapRequest(dynamics.SpecimenChoice):
     """Request for a map of motions over drive frequency and base amplitude."""
 
     start_hz: PositiveFloat = 60.0
@@ -119,7 +111,7 @@ class MapPicture:
     text: str
 
 
-class MotionRequest(SpecimenChoice):
+class MotionRequest(dynamics.SpecimenChoice):
     """Request for the motion from rest at one drive frequency and amplitude."""
 
     frequency_hz: PositiveFloat
@@ -178,14 +170,16 @@ def map_pictures(
 def picture_of(results: MapResults) -> MapPicture:
     """Return the picture of a map over frequency and amplitude."""
     frequency, amplitude = (results.plan.range_of(each).edges for each in results.plan.varying)
-    classes = motion_classes(results)
+    classes = dynamics.motion_classes(results)
     is_known = np.isfinite(classes)
     if is_known.any():
         _, nearest = distance_transform_edt(~is_known, return_indices=True)
         there = tuple(nearest)
     else:
         there = tuple(np.indices(classes.shape))
-    text = map_caption(results) if results.is_complete else f"{results.points} points computed so far."
+    text = (
+        dynamics.map_caption(results) if results.is_complete else f"{results.points} points computed so far."
+    )
     return MapPicture(
         frequency_hz=(frequency[0], frequency[-1]),
         amplitude_m=(amplitude[0], amplitude[-1]),
@@ -278,9 +272,9 @@ class Trouble:
 PartialResult = (
     SimulatedPoint
     | SimulatedSignal
-    | BranchLine
-    | SpectrumPoint
-    | ChainRun
+    | dynamics.BranchLine
+    | dynamics.SpectrumPoint
+    | dynamics.ChainRun
     | MapPicture
     | SettledMotion
     | Trouble
@@ -296,10 +290,10 @@ class Exponent(StrEnum):
     COMPUTED = "computed"
 
 
-class SimulationRequest(SpecimenChoice):
+class SimulationRequest(dynamics.SpecimenChoice):
     """Request for simulations at every frequency of a range."""
 
-    compared_with: ContactWord = "linear"
+    compared_with: dynamics.ContactWord = "linear"
     """Contact law of a second model, whose similarity with the first is shown; empty for none."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement."""

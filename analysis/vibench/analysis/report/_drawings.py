@@ -32,8 +32,7 @@ from ..sine.stepped_response import feedback_sentences, tracked_resonances
 from ..sine.sweep_analysis import Edge
 from ..tables import plus_minus
 from ..uncertainty.budget import COVERAGE, Budget, Cause
-from ._recording import bench_levels_figure, excitation_figure
-from ._style import DrawnFigure, agreement_text
+from ._style import DrawnFigure, agreement_text, bench_levels_figure, excitation_figure
 from ._sweep import hysteresis_figure, regions_text, sweep_figure, sweep_orders_figure
 
 

@@ -18,17 +18,8 @@ from vibench.sim import Parameter
 from vibench.sim.branches import least_growth_time_s
 from vibench.sim.maps import MapMotion, MapResults, Quantity, Spacing
 
+from .. import dynamics
 from ..comparison import Curve, CurveKind, CurveOrigin
-from ..dynamics import (
-    MOTION_CLASSES,
-    BranchDiagram,
-    BranchLine,
-    RecordedLevel,
-    map_caption,
-    motion_classes,
-    motion_words,
-    recorded_level,
-)
 from ..errors import NotEnoughData
 from ..hidden_motion import HiddenMotion
 from ..kinds import ANALYSES
@@ -56,7 +47,7 @@ _PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPO
 
 
 def branches_figure(
-    diagram: BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
+    diagram: dynamics.BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
 ) -> style.DrawnFigure:
     """Draw Responses I and II of m0 along every branch, with recordings behind them.
 
@@ -107,7 +98,7 @@ def branches_figure(
     )
 
 
-def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
+def draw_line(axes: Axes, line: dynamics.BranchLine, place: Reals, size: Reals) -> None:
     """Draw ``size`` over ``place`` into ``axes``: solid where stable, dashed where unstable, else dotted."""
     colour = (
         style.PREDICTED
@@ -121,7 +112,9 @@ def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
         axes.plot(place[piece], size[piece], color=colour, linestyle=dashes, label=label)
 
 
-def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[TrackedResonance]) -> None:
+def _backbone(
+    panels: Sequence[Axes], diagram: dynamics.BranchDiagram, tracked: Sequence[TrackedResonance]
+) -> None:
     """Draw the frequency of a phase resonance in place of Response I, and the tracked resonances."""
     panels[0].clear()
     for line in diagram.lines:
@@ -141,7 +134,7 @@ def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[
 
 
 def _growth(
-    axes: Axes, diagram: BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
+    axes: Axes, diagram: dynamics.BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
 ) -> None:
     """Draw the e-folding times of unstable motions; times below ``least_s`` are too short for the bench."""
     for line, held in zip(diagram.lines, holdable, strict=True):
@@ -159,12 +152,12 @@ def _growth(
     axes.set(ylim=(min(low, 0.5 * least_s), max(high, 2.0 * least_s)), ylabel="e-folding\ntime [s]")
 
 
-def _branch_place(diagram: BranchDiagram, line: BranchLine) -> Reals:
+def _branch_place(diagram: dynamics.BranchDiagram, line: dynamics.BranchLine) -> Reals:
     scale = 1.0 if diagram.request.along is Parameter.FREQUENCY else 1e6
     return np.asarray(scale * line.axis_values(diagram.request.along))
 
 
-def _events(axes: Axes, diagram: BranchDiagram) -> None:
+def _events(axes: Axes, diagram: dynamics.BranchDiagram) -> None:
     along = diagram.request.along
     for kind, (mark, colour) in EVENT_MARKS.items():
         found = [each for line in diagram.lines for each in line.events if each.kind == kind]
@@ -177,7 +170,7 @@ def _events(axes: Axes, diagram: BranchDiagram) -> None:
             axes.plot(place, size, mark, markerfacecolor="none", color=colour, label=kind)
 
 
-def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) -> None:
+def _draw_measured(axes: Axes, diagram: dynamics.BranchDiagram, curves: Sequence[Curve]) -> None:
     if diagram.request.along is not Parameter.FREQUENCY:
         return
     for curve in curves:
@@ -187,7 +180,7 @@ def _draw_measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) 
         axes.plot(curve.frequency_hz, curve.magnitude, ".", color=colour, alpha=0.7, label=label)
 
 
-def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
+def branch_tables(diagram: dynamics.BranchDiagram) -> tuple[Table, ...]:
     """Return one table with all points of the branches, and one table with their special points, if any."""
     lines = diagram.lines
     if not lines:
@@ -225,8 +218,8 @@ _UP_AND_DOWN = {"up": ("#0072b2", "up"), "down": ("#d55e00", "down")}
 def map_figure(
     results: MapResults,
     shown: str | None = None,
-    diagram: BranchDiagram | None = None,
-    levels: Sequence[RecordedLevel] = (),
+    diagram: dynamics.BranchDiagram | None = None,
+    levels: Sequence[dynamics.RecordedLevel] = (),
 ) -> style.DrawnFigure:
     """Draw a map over two quantities, or a bifurcation diagram along one quantity.
 
@@ -252,7 +245,7 @@ def map_figure(
     return style.DrawnFigure(
         name="map",
         title=f"{title}: {', '.join(each.long_name for each in results.plan.varying)}",
-        caption=" ".join(filter(None, (map_caption(results), *differences))),
+        caption=" ".join(filter(None, (dynamics.map_caption(results), *differences))),
         figure=figure,
         tables=(motion_table(results.motions),),
     )
@@ -261,7 +254,7 @@ def map_figure(
 def _map(
     results: MapResults,
     shown: str,
-    levels: Sequence[RecordedLevel],
+    levels: Sequence[dynamics.RecordedLevel],
 ) -> Figure:
     has_several = len(results.plan.start_labels) > 1 and shown != "motions"
     quantities = [shown, "motions"] if has_several else [shown]
@@ -270,7 +263,7 @@ def _map(
     if results.plan.is_basin:
         _draw_basins(panels[0], results)
     else:
-        _draw_kinds(panels[0], results, motion_classes(results), MOTION_CLASSES, columns=5)
+        _draw_kinds(panels[0], results, dynamics.motion_classes(results), dynamics.MOTION_CLASSES, columns=5)
     for axes, name in zip(panels[1:], quantities, strict=True):
         mesh = _draw(axes, results, results.map_values(name), norm=_scale(name, results.map_values(name)))
         figure.colorbar(mesh, ax=axes, label=SHOWN[name])
@@ -332,7 +325,7 @@ def _draw_basins(axes: Axes, results: MapResults) -> None:
     numbers = results.motion_numbers[:, 0].astype(np.float64)
     numbers[numbers < 0] = np.nan
     shown = zip(results.motions, _COLOURS, strict=False)
-    kinds = [(motion_words(results, each), colour) for each, colour in shown] or [("", _COLOURS[0])]
+    kinds = [(dynamics.motion_words(results, each), colour) for each, colour in shown] or [("", _COLOURS[0])]
     _draw_kinds(axes, results, np.minimum(numbers, len(kinds) - 1), kinds, columns=1)
 
 
@@ -345,7 +338,7 @@ def _scale(name: str, values: Reals) -> Normalize:
     return LogNorm(float(low), float(max(high, 1.001 * low)))
 
 
-def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
+def _diagram(results: MapResults, diagram: dynamics.BranchDiagram | None) -> Figure:
     figure = style.new_figure(2.0 * _STRIP_IN)
     panels = figure.subplots(2, 1, sharex=True)
     quantity = results.plan.varying[0]
@@ -387,7 +380,7 @@ def motion_table(motions: Sequence[MapMotion]) -> Table:
 
 def model_figures(
     results: CampaignResults,
-    diagrams: Sequence[BranchDiagram],
+    diagrams: Sequence[dynamics.BranchDiagram],
     maps: Sequence[MapResults],
     hidden: Sequence[HiddenMotion],
 ) -> Iterator[style.DrawnFigure]:
@@ -405,21 +398,23 @@ def draw_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[
         yield replace(drawn, name=f"map_{number}")
 
 
-def _recorded_levels(results: CampaignResults, *kinds: CurveKind) -> list[RecordedLevel]:
+def _recorded_levels(results: CampaignResults, *kinds: CurveKind) -> list[dynamics.RecordedLevel]:
     """Return level, responses and specimen of each stepped sine and sweep over a range of frequencies."""
     levels = []
     for each in results.in_order:
         facts, found = each.analysis.facts, each.analysis.response
         if isinstance(found, SweepResponse | SteppedResponse):
             with suppress(NotEnoughData):
-                level = recorded_level(found.frequency_hz, found.drive_amplitude_m)
+                level = dynamics.recorded_level(found.frequency_hz, found.drive_amplitude_m)
                 measured = ANALYSES[each.kind].curves(facts.name, CurveOrigin.MEASURED, found)
                 shown = [curve for curve in measured if not kinds or curve.response in kinds]
-                levels.append(RecordedLevel(facts.name, level, shown, known_specimen(facts.bench)))
+                levels.append(dynamics.RecordedLevel(facts.name, level, shown, known_specimen(facts.bench)))
     return levels
 
 
-def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[style.DrawnFigure]:
+def draw_branches(
+    results: CampaignResults, diagrams: Sequence[dynamics.BranchDiagram]
+) -> Iterator[style.DrawnFigure]:
     """Draw each branch diagram; diagrams over frequency also show results of stepped sines and sweeps."""
     levels = _recorded_levels(results)
     for number, diagram in enumerate(diagrams, start=1):
@@ -434,7 +429,7 @@ def draw_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
         yield replace(drawn, name=f"branches_{number}")
 
 
-def _backbones(results: CampaignResults, diagram: BranchDiagram) -> style.DrawnFigure:
+def _backbones(results: CampaignResults, diagram: dynamics.BranchDiagram) -> style.DrawnFigure:
     """Draw a computed phase resonance with the tracked resonances near it."""
     low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
     facts = [each.analysis.facts for each in results.in_order]
@@ -450,7 +445,7 @@ def _backbones(results: CampaignResults, diagram: BranchDiagram) -> style.DrawnF
     return replace(drawn, caption=" ".join(filter(None, (drawn.caption, *sentences))))
 
 
-def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
+def _lost_sentence(diagram: dynamics.BranchDiagram, level_m_per_s2: float) -> str:
     """State the model's largest Floquet multipliers at a level without resonance, or that there are none."""
     sizes: list[float] = []
     for line in diagram.lines:
@@ -463,7 +458,7 @@ def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
     return f"{text} the largest Floquet multiplier of the modelled motion is {multipliers}."
 
 
-def _level_sentence(diagram: BranchDiagram, level: RecordedLevel) -> str:
+def _level_sentence(diagram: dynamics.BranchDiagram, level: dynamics.RecordedLevel) -> str:
     """State how base amplitude and specimen of a recording differ from those of the branches."""
     request = diagram.request
     ratios = [
