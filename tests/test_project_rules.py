@@ -13,7 +13,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 26_705,
-    "analysis": 32_601,
+    "analysis": 32_594,
     "cli": 4_886,
     "extensions": 3_354,
     "gui": 11_808,

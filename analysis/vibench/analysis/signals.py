@@ -410,11 +410,6 @@ def _taps(factor: int) -> Reals:
     return np.asarray(scipy.signal.firwin(2 * half + 1, 1 / factor, window=("kaiser", beta)))
 
 
-def decimation_factor(sample_rate_hz: float, least_rate_hz: float) -> int:
-    """Return the largest decimation factor whose new rate is at least ``least_rate_hz``."""
-    return max(1, int(sample_rate_hz / least_rate_hz))
-
-
 class Quantity(StrEnum):
     """Displacement, velocity or acceleration."""
 

@@ -16,12 +16,11 @@ import lazy_loader
 
 from vibench.acquisition import require_extra
 
-from . import _choices
-
+_WITHOUT_FIGURES = {"SHOWN", "ImageKind", "Table", "table"}
 _public_name, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> Any:
-    if name in __all__ and name not in _choices.__all__:
+    if name in __all__ and name not in _WITHOUT_FIGURES:
         require_extra("figures")
     return _public_name(name)

@@ -21,7 +21,6 @@ from ..signals import (
     Quantity,
     Reals,
     converted_signal,
-    decimation_factor,
     disturbed_samples,
 )
 from ..tables import Tabular
@@ -246,7 +245,7 @@ class SweepSums:
                 f"a sweep from {low_hz:g} to {high_hz:g} Hz was stated; give ascending frequencies "
                 f"above 0 and below {sample_rate_hz / 4:g} Hz, a quarter of the sample rate"
             )
-        self._factor = decimation_factor(sample_rate_hz, _SAMPLES_PER_CYCLE * high_hz)
+        self._factor = max(1, int(sample_rate_hz / (_SAMPLES_PER_CYCLE * high_hz)))
         self._rate_hz = sample_rate_hz / self._factor
         self._interval = max(1, round(interval_s * self._rate_hz))
         self._low_hz, self._high_hz = low_hz, high_hz
