@@ -39,7 +39,7 @@ def error(specimen, drive, found, k):
 @pytest.fixture(scope="module")
 def near_the_first_resonance():
     """Branches of the paper's specimen around its first resonance, from 88 to 101 Hz at 5 um."""
-    return list(shoot_branches(gong2025(), LEVEL, 88.0, 101.0, MotionSearch(places=3, starts=12)))
+    return list(shoot_branches(gong2025(), LEVEL, 88.0, 101.0, MotionSearch(places=3, starts=4)))
 
 
 class PiecewiseLinear:

@@ -73,15 +73,17 @@ def test_a_motion_deep_inside_a_steep_contact_is_integrated_at_reference_accurac
 
 
 @pytest.mark.parametrize("contact", ["power:5", "power:29", "hertz", "linear_gap:2e5"])
-@pytest.mark.parametrize("gaps", [3.0, 1e3, pytest.param(1e6, marks=pytest.mark.thorough)])
-def test_a_failed_chain_run_ends_at_its_last_valid_state(contact, gaps):
+@pytest.mark.parametrize(
+    ("gaps", "duration_s"), [(3.0, 2e-3), (1e3, 2e-3), pytest.param(1e6, 2e-4, marks=pytest.mark.thorough)]
+)
+def test_a_failed_chain_run_ends_at_its_last_valid_state(contact, gaps, duration_s):
     """A run deep in contact once continued from an unfinished window, with 1e172 times the energy."""
     specimen = gong2025(damping_time_s=0.0, contact=contact)
     start = np.zeros((2, 6))
     start[0, 1] = gaps * specimen.gap_m
     chain = chain_of(specimen, 2)
     for drive in (STILL, Sampled(np.zeros(64), 1e4)):
-        run = integrate_chain(chain, drive, 2e-3, "standard", start)
+        run = integrate_chain(chain, drive, duration_s, "standard", start)
         ratio = chain_energies(chain, run.final_state).sum() / chain_energies(chain, start).sum()
         assert run.outcome is not Outcome.REACHED_END or ratio == pytest.approx(1.0, abs=0.01)
         assert ratio < 1.01
