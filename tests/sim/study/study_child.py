@@ -8,15 +8,15 @@ from vibench.sim.study import ExistingStudy, Study, open_study, solve_study
 
 STUDY = Study(
     frequencies_hz={"start": 180.0, "stop": 300.0, "step": 4.0},
-    amplitudes_m=(2e-6, 5e-6, 10e-6),
+    amplitudes_m=(2e-6, 10e-6),
     starts=("rest", "up"),
     duration_s=2.0,
     window_s=1.0,
     budget_s=0.0,
 )
 MAP = Map(
-    frequency_hz=Range(start=80.0, stop=300.0, points=29),
-    amplitude_m=Range(start=1e-6, stop=3e-5, points=21, spacing="logarithmic"),
+    frequency_hz=Range(start=80.0, stop=300.0, points=21),
+    amplitude_m=Range(start=1e-6, stop=3e-5, points=15, spacing="logarithmic"),
     periods=800,
 )
 PLANS = {"study": (STUDY, solve_study, open_study), "map": (MAP, solve_map, open_map)}

@@ -84,7 +84,7 @@ def cluster(tmp_path):
 @pytest.fixture(scope="module")
 def long_study():
     return Study(
-        frequencies_hz={"start": 180.0, "stop": 300.0, "step": 4.0},
+        frequencies_hz={"start": 180.0, "stop": 300.0, "step": 8.0},
         amplitudes_m=(2e-6, 10e-6),
         starts=("rest", "up"),
         duration_s=2.0,

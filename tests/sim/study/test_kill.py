@@ -51,7 +51,7 @@ def test_results_after_a_kill_and_a_resume_equal_uninterrupted_results(tmp_path,
     sessions = np.full(plan.grid.size, -1)
     for session in range(kills):
         words = tmp_path / f"words-{session}"
-        promised = run_and_kill(kind, path, words, luck.randint(1, 40), luck.uniform(0.0, 0.3))
+        promised = run_and_kill(kind, path, words, luck.randint(1, 40), luck.uniform(0.0, 0.1))
         kept = open_results(path).arrays
         is_kept = kept[STATE] == PointState.DONE
         assert np.count_nonzero(is_kept) >= promised
