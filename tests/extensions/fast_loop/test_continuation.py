@@ -164,34 +164,26 @@ def model_of(rig):
 
 
 @pytest.mark.thorough
-def test_a_branch_starts_from_rest_with_sinusoidal_base_motion_of_the_set_level(rig, tmp_path):
+def test_a_branch_starts_at_the_set_level_and_small_perturbations_show_its_stability(rig, tmp_path):
     hard = hardening(rig)
-    points, notes = follow_branch(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
+    path = tmp_path / "perturbed.h5"
+    points, notes = follow_branch(hard, continuation(start_hz=94, most_points=2, perturbation=0.02), path)
+    told = [each for each in notes if isinstance(each, BranchStabilityNote)]
     branch, _ = model_of(hard)
-    assert [each.point for each in points] == [0, 1]
+    assert [each.point for each in points] == [each.point for each in told] == [0, 1]
     assert notes[-1] == BranchEndNote(points=2, end=BranchEnd.POINTS)
     for each in points:
         assert each.base_m == pytest.approx(LEVEL_M, rel=0.004)
         assert each.residue < 0.005
         m0 = LEVEL_M * np.interp(each.frequency_hz, branch.frequencies_hz[:60], branch.response_ii[:60, 0])
         assert each.m0_m == pytest.approx(m0, rel=0.01)
-
-
-@pytest.mark.thorough
-def test_small_perturbations_show_stability_without_leaving_the_point(rig, tmp_path):
-    hard = hardening(rig)
-    path = tmp_path / "perturbed.h5"
-    points, notes = follow_branch(hard, continuation(start_hz=94, most_points=1, perturbation=0.02), path)
-    told = [each for each in notes if isinstance(each, BranchStabilityNote)]
-    branch, _ = model_of(hard)
     size = np.interp(94.0, branch.frequencies_hz[:60], np.abs(branch.multipliers[:60, 0]))
-    assert [each.point for each in told] == [0]
     assert told[0].stability is Stability.STABLE
     assert told[0].multiplier == pytest.approx(size, abs=2.1 * told[0].multiplier_u)
     assert told[0].multiplier_u < 0.015
     assert told[0].moved < 2e-3
     with open_recording(path) as recording:
-        (changed,) = [each for each in recording.segments if each.label == "perturbed"]
+        changed = next(each for each in recording.segments if each.label == "perturbed")
         lasted_s = (changed.stop - changed.first_sample) / recording.sample_rate_hz
         base = recording.read("base_acceleration", changed.first_sample, changed.stop)
         m0 = recording.read("m0_velocity", changed.first_sample, changed.stop)

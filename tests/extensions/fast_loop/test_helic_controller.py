@@ -193,7 +193,7 @@ def test_a_board_that_refuses_a_command_is_silenced_and_its_message_is_reported(
 def test_a_safety_gate_that_trips_ends_the_run(board_and_rig, tmp_path):
     board, rig = board_and_rig
     plan = BranchContinuation(
-        amplitude_vpp=4, base_level=BaseLevel(displacement_m=3e-6), start_hz=94, low_hz=90, high_hz=118
+        amplitude_vpp=4, base_level=BaseLevel(displacement_m=3e-6), start_hz=94, low_hz=93, high_hz=95
     )
     with open_bench(rig, confirm=confirm_simulated) as bench:
         bench.controller.play(SERIES)
