@@ -19,19 +19,21 @@ PLAN = Measurement(
 )
 
 
-@pytest.fixture
-def original(rig, tmp_path):
-    path = tmp_path / "original.h5"
+def record(rig, folder):
     with open_bench(rig) as bench:
-        run_measurement(bench, PLAN, path)
-    return path
+        return run_measurement(bench, PLAN, folder / "original.h5").path
+
+
+@pytest.fixture(scope="module")
+def original(rig, tmp_path_factory):
+    return record(rig, tmp_path_factory.mktemp("recorded"))
 
 
 @pytest.fixture
 def playing(rig, original):
-    """Return a function that makes the rig on which the recording replaces generator and converter."""
+    """Return a function that makes the rig on which a recording replaces generator and converter."""
 
-    def rig_of(**daq):
+    def rig_of(original=original, **daq):
         options = {"recording": str(original)}
         played = rig.daq.model_copy(update={"driver": "file", "options": options, **daq})
         silent = rig.generator.model_copy(update={"driver": "file", "resource": ""})
@@ -90,14 +92,15 @@ def test_playback_needs_no_valid_calibration(playing):
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("change", ["samples", "seal"])
-def test_an_altered_recording_is_not_played_back(playing, original, change):
-    with h5py.File(original, "r+") as file:
+def test_an_altered_recording_is_not_played_back(playing, rig, tmp_path, change):
+    altered = record(rig, tmp_path)
+    with h5py.File(altered, "r+") as file:
         if change == "seal":
             del file["seal"]
         else:
             file["m0_velocity"][...] = file["m0_velocity"][...] // 2
     with pytest.raises(ConfigurationError, match=r"data of /m0_velocity|its seal is gone"):
-        open_bench(playing(), calibration=CalibrationRule.WAIVED)
+        open_bench(playing(altered), calibration=CalibrationRule.WAIVED)
 
 
 @pytest.mark.thorough
