@@ -29,10 +29,7 @@ def new_plant(grid):
 
 def phasors(frequency_hz, amplitude_v, grid):
     """Return the complex amplitude of base and m0 in the fifth second, shape (2,) [m]."""
-    plant, count = (
-        LoadedShaker(amplifier_of(RIG), shaker_of(RIG), specimen_of(RIG), grid.step_s),
-        int(grid.rate_hz),
-    )
+    plant, count = new_plant(grid), int(grid.rate_hz)
     edges = 2 * np.pi * frequency_hz * grid.step_s * np.arange(5 * count + 1)
     drive = -amplitude_v * np.diff(np.cos(edges)) / (edges[1] - edges[0])
     truth = plant.move(drive, np.zeros(len(drive)), len(drive)).ends[-count:]
