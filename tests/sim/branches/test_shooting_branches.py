@@ -47,16 +47,22 @@ class PiecewiseLinear:
 
     def __init__(self, specimen, drive):
         mass, damping, stiffness = specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix
-        b = np.array([0.0, 1.0, -1.0])
-        self.stop = specimen.contact.stiffness
+        self.b, stop = np.array([0.0, 1.0, -1.0]), specimen.contact.stiffness
         self.gap, self.omega, self.mass = specimen.gap_m, 2.0 * math.pi * drive.frequency_hz, mass
-        self.damping = damping
-        self.free, self.pressed = stiffness, stiffness + self.stop * np.outer(b, b)
-        self.b = b
+        self.damping, self.stiffness = damping, stiffness
+        self.pressed, self.push = stiffness + stop * np.outer(self.b, self.b), stop * self.gap * self.b
         self.force = np.zeros(3, complex)
         self.force[0] = (specimen.stiffnesses[0] + 1j * self.omega * specimen.dampings[0]) * (
             drive.amplitude_m / 1j
         )
+
+    def fly(self, state, start, length):
+        """Return the state after a time without contact."""
+        return self.step(state, start, length, self.stiffness, np.zeros(3))
+
+    def press(self, state, start, length):
+        """Return the state after a time in contact with the stop at positive p."""
+        return self.step(state, start, length, self.pressed, self.push)
 
     def step(self, state, start, length, stiffness, push):
         inverse = np.linalg.inv(self.mass)
@@ -79,9 +85,8 @@ class PiecewiseLinear:
         def equations(unknowns):
             entry, start, length = unknowns[:6] * 1e-6, unknowns[6] * 1e-3, unknowns[7] * 1e-5
             entry = entry * np.repeat([1.0, 1e3], 3)
-            push = self.stop * self.gap * self.b
-            leaving = self.step(entry, start, length, self.pressed, push)
-            back = self.step(leaving, start + length, half - length, self.free, np.zeros(3))
+            leaving = self.press(entry, start, length)
+            back = self.fly(leaving, start + length, half - length)
             p_in, p_out = self.b @ entry[:3], self.b @ leaving[:3]
             moved = (back + entry) / np.repeat([1e-6, 1e-3], 3)
             return np.array([*moved, (p_in - self.gap) / 1e-6, (p_out - self.gap) / 1e-6])
@@ -112,21 +117,16 @@ def test_a_branch_with_linear_stops_matches_the_piecewise_exact_solution():
         piecewise = PiecewiseLinear(specimen, drive)
         entry, start, contact = piecewise.motion(run.states[enters], run.time_s[enters], lasts)
         half = math.pi / piecewise.omega
-        leaving = piecewise.step(
-            entry, start, contact, piecewise.pressed, piecewise.stop * piecewise.gap * piecewise.b
-        )
+        leaving = piecewise.press(entry, start, contact)
         turn = math.ceil((start + contact) * drive.frequency_hz) / drive.frequency_hz
         ahead = turn - start - contact
         if ahead < half - contact:
-            exact = piecewise.step(leaving, start + contact, ahead, piecewise.free, np.zeros(3))
+            exact = piecewise.fly(leaving, start + contact, ahead)
         else:
-            pushed = piecewise.step(leaving, start + contact, half - contact, piecewise.free, np.zeros(3))
-            opposite = -piecewise.step(
-                -pushed, start, contact, piecewise.pressed, piecewise.stop * piecewise.gap * piecewise.b
+            opposite = -piecewise.press(
+                -piecewise.fly(leaving, start + contact, half - contact), start, contact
             )
-            exact = piecewise.step(
-                opposite, start + half + contact, ahead - half, piecewise.free, np.zeros(3)
-            )
+            exact = piecewise.fly(opposite, start + half + contact, ahead - half)
         difference = (exact - branch.states[k]) / state_scales(specimen, drive)
         assert np.abs(difference).max() < 1e-7
         checked += 1
