@@ -7,8 +7,9 @@ import pytest
 from vibench.cli.paper.claim import finding
 from vibench.cli.paper.options import SCORED_S, Case
 from vibench.cli.paper.page import CLAIMS, SECTIONS, reproduction, reproduction_document
-from vibench.cli.paper.reading import Evidence
+from vibench.cli.paper.reading import Evidence, Reading
 from vibench.cli.paper.settings import score_figure, scores
+from vibench.cli.paper.similarity_claims import rates
 from vibench.sim import Accuracy
 from vibench.sim.study import solve_study
 
@@ -42,6 +43,16 @@ def test_short_runs_show_the_effects_of_collisions(evidence):
     assert [each.key for each in claims(*HERTZ_KEYS) if not finding(each, evidence, case).is_met] == []
     asked = [each.study for each in evidence.studies]
     assert len(asked) == len(set(asked)) == 3
+
+
+@pytest.mark.thorough
+def test_models_are_compared_up_to_the_requested_frequency(evidence):
+    low, all_of_it = (
+        rates(Reading(evidence, replace(SHORT, similarity_highest_hz=each)), "power:3", "response_i")[2]
+        for each in (50, 300)
+    )
+    assert low == 1.0
+    assert all_of_it < 0.9
 
 
 @pytest.mark.thorough
