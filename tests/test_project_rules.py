@@ -13,12 +13,12 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 26_705,
-    "analysis": 32_602,
-    "cli": 4_887,
+    "analysis": 32_917,
+    "cli": 4_886,
     "extensions": 3_354,
     "gui": 11_808,
     "native": 6_874,
-    "sim": 20_712,
+    "sim": 20_737,
     "studies": 2_920,
     "virtual_rig": 6_506,
 }
@@ -118,4 +118,4 @@ def test_a_package_stays_within_its_line_budget(folder):
     ]
     lines = sum(path.read_text(encoding="utf-8").count("\n") for path in sources)
     assert 0 < lines <= LINES_AT_MOST[folder]
-    assert sum(LINES_AT_MOST.values()) <= 116_368
+    assert sum(LINES_AT_MOST.values()) <= 116_707

@@ -244,7 +244,8 @@ def _has_left(orbit: PeriodicOrbit) -> bool:
 
 def _direction(mapping: PeriodMap, state: Floats, drive: Harmonic) -> Floats:
     """Return the scaled eigenvector of the Floquet multiplier nearest to -1, shape (6,); largest entry 1."""
-    values, vectors = np.linalg.eig(mapping.derivative(state, drive))
+    _, _, derivative = next(mapping.iterates(state, drive))
+    values, vectors = np.linalg.eig(derivative)
     direction = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     return np.asarray(direction / np.abs(direction).max())
 

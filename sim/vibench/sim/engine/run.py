@@ -321,6 +321,16 @@ class NativeRun(_Run):
         record.structure["steps_left"] = max(left, 0)
         return outcome_of(code, f"to advance to {until_s} s: the end time must be finite")
 
+    def image(self, until_s: float, record: RunRecord) -> tuple[Floats, Floats]:
+        """Advance to a time [s]; return the state, (6,), and d(state) / d(state now), (6, 6); NaN on failure.
+
+        At a grazing impact on a rigid stop, where no derivative exists, very large numbers are returned.
+        """
+        self.carry(np.eye(DIRECTIONS))
+        if self.advance(until_s, record) is not Outcome.REACHED_END:
+            return np.full(DIRECTIONS, np.nan), np.full((DIRECTIONS, DIRECTIONS), np.nan)
+        return self.motion, (np.exp(self.growth)[:, None] * self.changes).T
+
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
         """Advance to the end of interval ``last``; add the growth of tangent vectors to ``readings``."""
         code = self.engine.take_readings(

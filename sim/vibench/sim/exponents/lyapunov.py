@@ -10,11 +10,14 @@ import math
 import sys
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
+from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ, Accuracy, AccuracyWord, Outcome
+from ..periodic.newton import newton_iterates
 from ..periodic.shooting import FLOW_ERROR, flow_derivative
 from ..specimen.drive import Harmonic
 from ..specimen.modes import modal_form
@@ -294,12 +297,12 @@ def exponents_of_cycle(
     The error is the change in the last Newton step plus the effect of the integration error, which is large
     for multipliers that are close together or small.
     """
-    scales, found, error = state_scales(specimen, drive), _UNKNOWN, _UNKNOWN
-    for _ in range(NEWTON_STEPS):
-        after, derivative = flow_derivative(specimen, drive, state, length_s)
-        if not bool(np.all(np.isfinite(derivative))):
+    found, error = _UNKNOWN, _UNKNOWN
+    image = partial(flow_derivative, specimen, drive, duration_s=length_s)
+    iterates = newton_iterates(image, state, state_scales(specimen, drive))
+    for _, _, scaled in islice(iterates, NEWTON_STEPS):
+        if not bool(np.all(np.isfinite(scaled))):
             return _UNKNOWN, _UNKNOWN
-        scaled = derivative * scales / scales[:, None]
         values, vectors = np.linalg.eig(scaled)
         with np.errstate(divide="ignore", invalid="ignore"):  # a multiplier may be zero
             lengths = np.linalg.norm(np.linalg.pinv(vectors, rcond=0.0), axis=1)
@@ -307,8 +310,6 @@ def exponents_of_cycle(
             order = np.argsort(-np.abs(values))
             before, found = found, np.log(np.abs(values[order])) / length_s
             error = np.abs(found - before) + FLOW_ERROR * condition[order] / length_s
-        step = np.linalg.lstsq(scaled - np.eye(DIRECTIONS), (after - state) / scales)[0]
-        state = state - scales * step
     return found, error
 
 

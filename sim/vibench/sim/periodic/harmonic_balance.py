@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..engine.run import check_time
 from ..specimen.specimen import Complex, Floats, Specimen
+from .newton import size_of
 from .restoring_force import RestoringForce
 
 # A linear structure with one nonlinear spring, condensed to the spring's elongation p. SI units.
@@ -386,12 +387,6 @@ def newton(problem: BalanceProblem, start: Floats, omega: float, amplitude_m: fl
             return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
         unknowns, residual, jacobian, error = trial, trial_residual, trial_jacobian, trial_error
     return unknowns, error < 1e3 * ROUNDING * max(1.0, size_of(unknowns))
-
-
-def size_of(values: Floats) -> float:
-    """Return the largest magnitude of an array; infinite if any value is not finite."""
-    size = float(np.max(np.abs(values)))
-    return size if math.isfinite(size) else math.inf
 
 
 def with_harmonics(phasors: Complex, known: Harmonics, wanted: Harmonics) -> Complex:

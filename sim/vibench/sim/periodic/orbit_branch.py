@@ -50,8 +50,8 @@ class ExactFamily:
         The map scales velocities by the drive frequency, the family by the reference frequency.
         """
         ratio = state_scales(self.mapping.specimen, drive) / self.scales
-        derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
-        return (self.mapping.image(state, drive) - state) / self.scales, derivative - np.eye(6), ratio
+        _, gone, derivative = next(self.mapping.iterates(state, drive))
+        return ratio * gone, ratio[:, None] * derivative / ratio[None, :] - np.eye(6), ratio
 
     def refine(self, point: Floats, tangent: Floats) -> tuple[Family, Floats, Floats] | None:  # noqa: ARG002
         """Return None, because shooting has no finer resolution."""
@@ -91,9 +91,8 @@ class OrbitFamily(ExactFamily):
 
     def report(self, point: Floats) -> OrbitReport:
         """Return responses, Floquet multipliers and contacts of the motion at a point."""
-        state, drive = self.state_at(point), self.drive_at(point)
-        gone = (self.mapping.image(state, drive) - state) / state_scales(self.mapping.specimen, drive)
-        orbit = describe_orbit(self.mapping, drive, state, gone)
+        drive = self.drive_at(point)
+        orbit = describe_orbit(self.mapping, drive, *next(self.mapping.iterates(self.state_at(point), drive)))
         return OrbitReport(
             frequency_hz=orbit.drive.frequency_hz,
             amplitude_m=orbit.drive.amplitude_m,

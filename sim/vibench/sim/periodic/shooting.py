@@ -5,16 +5,16 @@ Newton's iteration on the period map finds stable and unstable motions with any 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import islice
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.run import (
-    DIRECTIONS,
     MAX_IMPACT_RATE_HZ,
     Accuracy,
     NativeRun,
@@ -31,7 +31,8 @@ from ..specimen.specimen import Complex, Floats, Specimen, Y, Z, state_scales
 from ..specimen.stops import member
 from .branch import NEUTRAL, BifurcationKind, OrbitShape, OrbitShapeWord, OrbitSigns
 from .floquet import multipliers
-from .harmonic_balance import phasors_of, size_of
+from .harmonic_balance import phasors_of
+from .newton import newton_iterates, size_of
 
 # Exact map of a state over a whole or half period, with derivatives. SI units.
 #
@@ -98,15 +99,18 @@ class PeriodMap:
         """Return the motion from a state for one period, with ``samples`` samples per drive period."""
         return self._run(state, drive, float(self.periods), samples * drive.frequency_hz)
 
-    def derivative(self, state: Floats, drive: Harmonic) -> Floats:
-        """Return d(final state) / d(initial state), both states divided by their scales, shape (6, 6)."""
-        if not self._may_start(state):
-            return np.full((6, 6), math.nan)
-        scales = state_scales(self.specimen, drive)
-        duration = self.turns / drive.frequency_hz
-        _, derivative = flow_derivative(self.specimen, drive, state, duration, Accuracy.REFERENCE)
-        scaled = derivative * scales / scales[:, None]
-        return -scaled if self.shape is OrbitShape.MIRRORED else scaled
+    def iterates(
+        self, state: Floats, drive: Harmonic, halvings: int = 0
+    ) -> Iterator[tuple[Floats, Floats, Floats]]:
+        """Yield state, closure error and scaled Jacobian of Newton's iteration; see `newton_iterates`."""
+
+        def image(state: Floats) -> tuple[Floats, Floats]:
+            if not self._may_start(state):
+                return np.full(6, math.nan), np.full((6, 6), math.nan)
+            after, jacobian = flow_derivative(self.specimen, drive, state, self.turns / drive.frequency_hz)
+            return (-after, -jacobian) if self.shape is OrbitShape.MIRRORED else (after, jacobian)
+
+        return newton_iterates(image, state, state_scales(self.specimen, drive), halvings)
 
     def frequency_slope(self, state: Floats, drive: Harmonic) -> Floats:
         """Return the scaled derivative d(final state) / d ln(frequency), shape (6,)."""
@@ -225,42 +229,23 @@ def periodic_orbit(
     mapping = PeriodMap(specimen, member(OrbitShape, shape), periods)
     settling = SETTLING_PERIODS / drive.frequency_hz
     first = integrate(specimen, drive, settling).final_state if start is None else start_motion(start)
-    scales = state_scales(specimen, drive)
-    state = first.copy()
-    gone = (mapping.image(state, drive) - state) / scales
-    for _ in range(NEWTON_ITERATIONS):
-        if not size_of(gone) > RETURNED:
+    for found in islice(mapping.iterates(first, drive, MOST_HALVINGS), NEWTON_ITERATIONS + 1):
+        if not size_of(found[1]) > RETURNED:
             break
-        slope = mapping.derivative(state, drive) - np.eye(6)
-        if not bool(np.all(np.isfinite(slope))):
-            break
-        step = np.linalg.lstsq(slope, gone)[0] * scales
-        state, gone, is_better = _damped_step(mapping, drive, state, step, gone)
-        if not is_better:
-            break
-    return describe_orbit(mapping, drive, state, gone)
+    return describe_orbit(mapping, drive, *found)
 
 
-def _damped_step(
-    mapping: PeriodMap, drive: Harmonic, state: Floats, step: Floats, gone: Floats
-) -> tuple[Floats, Floats, bool]:
-    """Halve a Newton step until the closure error falls; return state, closure error, and whether it fell."""
-    scales = state_scales(mapping.specimen, drive)
-    for halving in range(MOST_HALVINGS):
-        trial = state - 0.5**halving * step
-        trial_gone = (mapping.image(trial, drive) - trial) / scales
-        if size_of(trial_gone) < size_of(gone):
-            return trial, trial_gone, True
-    return state, gone, False
+def describe_orbit(
+    mapping: PeriodMap, drive: Harmonic, state: Floats, gone: Floats, derivative: Floats
+) -> PeriodicOrbit:
+    """Return the periodic motion from ``state`` with its responses.
 
-
-def describe_orbit(mapping: PeriodMap, drive: Harmonic, state: Floats, gone: Floats) -> PeriodicOrbit:
-    """Return the periodic motion from ``state`` with its responses; ``gone`` is the scaled closure error."""
+    ``gone`` and ``derivative`` are closure error and Jacobian of the scaled map; see `newton_iterates`.
+    """
     run = mapping.orbit(state, drive, SAMPLES)
     moved = np.full((mapping.periods * SAMPLES, 3), math.nan)  # NaN remains if the run has failed
     moved[: len(run.states)] = run.states[: len(moved), :3]
     seen = mapping.response(state, drive)
-    derivative = mapping.derivative(state, drive)
     lines = np.array(
         [seen.line_x_m, *(phasors_of(moved[:, k])[mapping.periods] for k in (Y, Z)), seen.line_p_m]
     )
@@ -377,8 +362,7 @@ def flow_derivative(
 ) -> tuple[Floats, Floats]:
     """Return the final state of a run from time zero of the drive, and d(final state) / d(initial state).
 
-    The shapes are (6,) and (6, 6); NaN if the run did not finish. At a grazing impact on a rigid stop, where
-    no derivative exists, very large numbers are returned.
+    The shapes are (6,) and (6, 6), as in `NativeRun.image`; NaN if the run did not finish.
 
     Parameters
     ----------
@@ -392,8 +376,4 @@ def flow_derivative(
         Accuracy of the motion and of its derivative.
     """
     run = NativeRun(specimen, drive, start_motion(state), accuracy.tolerance)
-    run.carry(np.eye(DIRECTIONS))
-    outcome = run.advance(duration_s, RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, duration_s)))
-    if outcome is not Outcome.REACHED_END:
-        return np.full(6, np.nan), np.full((6, 6), np.nan)
-    return run.motion, (np.exp(run.growth)[:, None] * run.changes).T
+    return run.image(duration_s, RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, duration_s)))

@@ -9,11 +9,13 @@ SI units.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 
 from ..engine.run import Outcome, Watch
 from ..periodic.branch import NEUTRAL
+from ..periodic.newton import newton_iterates
 from ..specimen.specimen import Floats
 from .followed_run import (
     Block,
@@ -68,23 +70,24 @@ def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
 
 
 def _fixed_point(near: FollowedRun, period: int) -> FixedPoint | None:
-    run, gone, scales = near.copy(min(TOLERANCE, STRICTER * near.tolerance)), np.inf, near.scales
-    start = run.state / scales
-    size, exponents = float(np.abs(start).max(initial=1e-300)), np.empty(0)
-    for _ in range(ITERATIONS):
-        image, slope = run.image(period)
-        off = (image - run.state) / scales
-        if not np.all(np.isfinite(slope)) or not np.abs(off).max() < max(gone, RETURNED * size):
+    run, start, scales = near.copy(min(TOLERANCE, STRICTER * near.tolerance)), near.state, near.scales
+    size, gone, exponents = float(np.abs(start / scales).max(initial=1e-300)), np.inf, np.empty(0)
+
+    def image(state: Floats) -> tuple[Floats, Floats]:
+        if state is not start:
+            run.place(state)
+        return run.image(period)
+
+    for state, off, scaled in islice(newton_iterates(image, start, scales), ITERATIONS):
+        if not np.all(np.isfinite(scaled)) or not np.abs(off).max() < max(gone, RETURNED * size):
             return None
         gone = float(np.abs(off).max())
-        scaled = slope * scales / scales[:, None]
-        away = np.linalg.inv(np.eye(6) - scaled)
         largest = max(float(np.abs(np.linalg.eigvals(scaled)).max()), 1e-300)
         exponents = np.append(exponents, math.log(largest) * run.drive.frequency_hz / period)[-2:]
         if gone < RETURNED * size and len(exponents) == 2:
-            distance = float(np.abs(run.state / scales - start).max()) / size
+            distance = float(np.abs((state - start) / scales).max()) / size
+            away = np.linalg.inv(np.eye(6) - scaled)
             return FixedPoint(run, away, distance, period, exponents) if largest < 1.0 - NEUTRAL else None
-        run = run.with_push(away @ off * scales)
     return None
 
 

@@ -193,8 +193,12 @@ class FollowedRun:
     def with_push(self, push: Floats) -> Self:
         """Return a copy of the motion whose current state is changed by ``push``, shape (6,)."""
         twin = self.copy()
-        twin._run.place(start_motion(self.state + push))  # noqa: SLF001 - of the same class
+        twin.place(self.state + push)
         return twin
+
+    def place(self, state: Floats) -> None:
+        """Set the current state, shape (6,); raise ValueError if this state is not allowed."""
+        self._run.place(start_motion(state))
 
     def follow(
         self,
@@ -239,17 +243,13 @@ class FollowedRun:
 
     def image(self, drive_periods: int) -> tuple[Floats, Floats]:
         """Return the state `drive_periods` later and its Jacobian, (6,) and (6, 6); NaN if the run fails."""
-        run, frequency_hz = self._run.copy(), self.drive.frequency_hz
-        made = self.time_s * frequency_hz if self.periods is None else self.periods
-        until_s = (made + drive_periods) / frequency_hz
-        run.carry(np.eye(DIRECTIONS))
+        made = self.time_s * self.drive.frequency_hz if self.periods is None else self.periods
+        until_s = (made + drive_periods) / self.drive.frequency_hz
         steps = self._steps_left // TANGENT_STEPS
         record = RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, until_s - self.time_s), steps=steps)
-        outcome = run.advance(until_s, record)
+        image = self._run.copy().image(until_s, record)
         self._steps_left -= TANGENT_STEPS * (steps - record.steps_left)
-        if outcome is not Outcome.REACHED_END:
-            return np.full(DIRECTIONS, np.nan), np.full((DIRECTIONS, DIRECTIONS), np.nan)
-        return run.motion, (np.exp(run.growth)[:, None] * run.changes).T
+        return image
 
     def _size(self) -> float:
         """Return the natural logarithm of the norm of the tangent vector; NaN without one.
