@@ -8,8 +8,8 @@ import numpy as np
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Complex, Floats, Y, Z
 from ..specimen.stops import member
-from .branch import Branch, OrbitShape, OrbitSigns
-from .branch_following import DrivePath, OrbitReport, follow_both_ways, parameter_value, range_scale
+from .branch import Branch, OrbitReport, OrbitShape, OrbitSigns
+from .branch_following import DrivePath, follow_both_ways, parameter_value, range_scale
 from .continuation import ArcSteps
 from .first_order_balance import first_order_states
 from .floquet import Motion, crossings, multipliers, transition
@@ -192,15 +192,9 @@ class BalanceFamily:
         """Return responses, Floquet multipliers and contacts of the motion at a point."""
         frequency, amplitude = self.drive(point)
         found = balance_of_solution(self.problem, point[:-1], frequency, amplitude, self.tolerance)
-        return OrbitReport(
-            frequency_hz=found.frequency_hz,
-            amplitude_m=found.amplitude_m,
-            response_i=found.response_i,
-            response_ii=found.response_ii,
-            state=found.state,
-            signs=orbit_signs(self.problem.structure, self.problem.spring, found, self.options.kept),
-            left_out=found.left_out,
-        )
+        signs = orbit_signs(self.problem.structure, self.problem.spring, found, self.options.kept)
+        drive = Harmonic(frequency, amplitude)
+        return OrbitReport(drive, found.state, signs, found.response_i, found.response_ii, found.left_out)
 
     def refine(self, point: Floats, tangent: Floats) -> "tuple[BalanceFamily, Floats, Floats] | None":
         """Return the family with twice the harmonics (new harmonics are zero); None at the limit."""

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..specimen.drive import Harmonic
 from ..specimen.specimen import Complex, Floats
 from .continuation import ArcEnd
 
@@ -178,6 +179,22 @@ class OrbitSigns:
         pairs = list(itertools.combinations(self.multipliers, 2))
         first, _ = min(pairs, key=lambda pair: abs(pair[0] * pair[1] - 1.0))
         return bool(abs(first.imag) > COMPLEX_PART)
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitReport:
+    """Periodic motion at one drive, with its stability and responses."""
+
+    drive: Harmonic
+    state: Floats
+    """Displacements (x, y, z) and velocities at time zero of the drive, shape (2 n,)."""
+    signs: OrbitSigns
+    response_i: Floats
+    """Largest magnitude of every displacement and of p, relative to the drive amplitude, shape (n + 1,)."""
+    response_ii: Floats
+    """Amplitude of every displacement and of p at the drive frequency, relative to A0, shape (n + 1,)."""
+    error: float
+    """Error of the motion relative to the fundamental of p, as in `Branch.left_out`."""
 
 
 def bifurcations_between(before: OrbitSigns, after: OrbitSigns) -> list[BifurcationKind]:

@@ -16,6 +16,7 @@ from .branch import (
     BifurcationKind,
     Branch,
     BranchEvent,
+    OrbitReport,
     OrbitSigns,
     Parameter,
     bifurcations_between,
@@ -92,22 +93,6 @@ DrivePath = FrequencyPath | AmplitudePath
 def _refuse_unless_positive(name: str, value: float, unit: str) -> None:
     if not 0.0 < value < math.inf:
         raise ValueError(f"A drive {name} of {value} {unit} is not allowed: it must be positive and finite.")
-
-
-@dataclass(frozen=True, eq=False)
-class OrbitReport:
-    """Results at one point of a branch; fields as in `Branch`."""
-
-    frequency_hz: float
-    amplitude_m: float
-    response_i: Floats
-    """Response I of every displacement and of p, shape (n + 1,)."""
-    response_ii: Floats
-    """Response II of every displacement and of p, shape (n + 1,)."""
-    state: Floats
-    """Displacements and velocities at time zero of the drive, shape (2 n,)."""
-    signs: OrbitSigns
-    left_out: float
 
 
 class Family(Curve, Protocol):
@@ -242,7 +227,7 @@ class _FollowedBranch:
             if here.is_fold:
                 self._add_event(BifurcationKind.FOLD, report)
                 continue
-            if report.left_out > family.tolerance and family.refine(before.point, before.tangent) is not None:
+            if report.error > family.tolerance and family.refine(before.point, before.tangent) is not None:
                 return None, before
             if here.end is ArcEnd.TOO_MANY_POINTS:
                 return here.end, here
@@ -265,21 +250,21 @@ class _FollowedBranch:
         reports = self.reports
         return Branch(
             parameter=self.family.path.parameter,
-            frequencies_hz=np.array([r.frequency_hz for r in reports]),
-            amplitudes_m=np.array([r.amplitude_m for r in reports]),
+            frequencies_hz=np.array([r.drive.frequency_hz for r in reports]),
+            amplitudes_m=np.array([r.drive.amplitude_m for r in reports]),
             response_i=np.array([r.response_i for r in reports]),
             response_ii=np.array([r.response_ii for r in reports]),
             states=np.array([r.state for r in reports]),
             multipliers=np.array([r.signs.over_period for r in reports]),
-            left_out=np.array([r.left_out for r in reports]),
+            left_out=np.array([r.error for r in reports]),
             contacts=np.array([r.signs.contacts for r in reports], dtype=np.int64),
             events=tuple(self.events),
             end=end,
         )
 
     def _add_event(self, kind: BifurcationKind, report: OrbitReport) -> None:
-        last = len(self.reports) - 1
-        self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
+        last, drive = len(self.reports) - 1, report.drive
+        self.events.append(BranchEvent(kind, drive.frequency_hz, drive.amplitude_m, report.state, last))
 
     def _end_on_simpler(self, before: ArcPoint, after: ArcPoint, signs: OrbitSigns) -> None:
         """End a branch where it starts to repeat: at a motion that is mirrored or has half the period."""

@@ -1,6 +1,7 @@
 """Branches of exact periodic motions with impacts, along frequency or amplitude, through folds. SI units."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,14 +10,13 @@ import numpy as np
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Floats, state_scales
 from ..specimen.stops import member
-from .branch import Branch, Parameter, ParameterWord
+from .branch import Branch, OrbitReport, Parameter, ParameterWord
 from .branch_following import (
     RANGE_LENGTH,
     AmplitudePath,
     DrivePath,
     Family,
     FrequencyPath,
-    OrbitReport,
     follow,
     follow_both_ways,
     parameter_value,
@@ -30,7 +30,7 @@ ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, m
 
 
 @dataclass(frozen=True, eq=False)
-class ExactFamily:
+class ExactFamily(ABC):
     """Periodic motions as fixed points of the period map."""
 
     mapping: PeriodMap
@@ -57,6 +57,20 @@ class ExactFamily:
         """Return None, because shooting has no finer resolution."""
         return None
 
+    @abstractmethod
+    def drive_at(self, point: Floats) -> Harmonic:
+        """Return the drive at a point of the curve."""
+
+    def state_at(self, point: Floats) -> Floats:
+        """Return the state at time zero of the drive, for a point of the curve."""
+        return point[:6] * self.scales
+
+    def report(self, point: Floats) -> OrbitReport:
+        """Return responses, Floquet multipliers and contacts of the motion at a point."""
+        drive = self.drive_at(point)
+        found = next(self.mapping.iterates(self.state_at(point), drive))
+        return describe_orbit(self.mapping, drive, *found)
+
 
 @dataclass(frozen=True, eq=False)
 class OrbitFamily(ExactFamily):
@@ -69,10 +83,6 @@ class OrbitFamily(ExactFamily):
     def drive_at(self, point: Floats) -> Harmonic:
         """Return the drive at a point of the curve."""
         return Harmonic(*self.path.drive(float(point[-1]) * self.scale))
-
-    def state_at(self, point: Floats) -> Floats:
-        """Return the state at time zero of the drive, for a point of the curve."""
-        return point[:-1] * self.scales
 
     def linearise(self, point: Floats) -> tuple[Floats, Floats]:
         """Return the closure error after a period, and its derivatives d/d(state) and d/d(parameter)."""
@@ -88,20 +98,6 @@ class OrbitFamily(ExactFamily):
             slope += by_amplitude / drive.amplitude_m * self.mapping.amplitude_slope(state, drive)
         along = ratio * slope * self.scale
         return gone, np.column_stack([by_state, along])
-
-    def report(self, point: Floats) -> OrbitReport:
-        """Return responses, Floquet multipliers and contacts of the motion at a point."""
-        drive = self.drive_at(point)
-        orbit = describe_orbit(self.mapping, drive, *next(self.mapping.iterates(self.state_at(point), drive)))
-        return OrbitReport(
-            frequency_hz=orbit.drive.frequency_hz,
-            amplitude_m=orbit.drive.amplitude_m,
-            response_i=orbit.response_i,
-            response_ii=orbit.response_ii,
-            state=orbit.state,
-            signs=orbit.signs,
-            left_out=orbit.error,
-        )
 
 
 def periodic_branch(

@@ -18,9 +18,9 @@ from ..specimen.modes import base_transmissibility
 from ..specimen.specimen import Floats, Specimen
 from ..specimen.stops import member
 from .branch import Branch, OrbitShape
-from .branch_following import AmplitudePath, DrivePath, OrbitReport, follow
+from .branch_following import AmplitudePath, DrivePath, follow
 from .continuation import ArcSteps, correct
-from .orbit_branch import ExactFamily, OrbitFamily
+from .orbit_branch import ExactFamily
 from .shooting import PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
@@ -66,7 +66,7 @@ class PhaseResonanceFamily(ExactFamily):
         """Return closure error and phase error, shape (7,), and their Jacobian, shape (7, 8)."""
         if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
-        drive, state = self.drive_at(point), point[:6] * self.scales
+        drive, state = self.drive_at(point), self.state_at(point)
         gone, by_state, ratio = self.closure(state, drive)
         if not bool(np.all(np.isfinite(gone))):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
@@ -80,15 +80,9 @@ class PhaseResonanceFamily(ExactFamily):
     def _error(self, point: Floats) -> float:
         """Return the sine of the phase error of m0 relative to the base."""
         # The base A0 sin(w t) has the phasor -i A0.
-        phasor = 1j * self.mapping.response(point[:6] * self.scales, self.drive_at(point)).line_x_m
+        phasor = 1j * self.mapping.response(self.state_at(point), self.drive_at(point)).line_x_m
         turned = self.of.motion(phasor / self.amplitude_m(point)) * np.exp(-1j * self.phase_rad)
         return float(turned.imag / abs(turned))
-
-    def report(self, point: Floats) -> OrbitReport:
-        """Return responses, Floquet multipliers and contacts of the motion at a point."""
-        drive = self.drive_at(point)
-        family = OrbitFamily(self.mapping, drive, AmplitudePath(drive.frequency_hz), drive.amplitude_m)
-        return family.report(np.append(point[:6] * self.scales / family.scales, 1.0))
 
 
 def phase_resonance_branch(

@@ -29,7 +29,7 @@ from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Complex, Floats, Specimen, Y, Z, state_scales
 from ..specimen.stops import member
-from .branch import NEUTRAL, BifurcationKind, OrbitShape, OrbitShapeWord, OrbitSigns
+from .branch import NEUTRAL, BifurcationKind, OrbitReport, OrbitShape, OrbitShapeWord, OrbitSigns
 from .floquet import multipliers
 from .harmonic_balance import phasors_of
 from .newton import newton_iterates, size_of
@@ -167,23 +167,16 @@ class ShootingEnd(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class PeriodicOrbit:
-    """Periodic motion found by shooting, with its stability and responses."""
+class PeriodicOrbit(OrbitReport):
+    """Periodic motion found by shooting, with its stability and responses.
 
-    drive: Harmonic
+    ``error`` bounds the errors of the motion and of the responses of x and p: closure and integration error
+    times |(map - I)^-1|.
+    """
+
     period_map: PeriodMap
-    state: Floats
-    """x, y, z, vx, vy, vz at time zero of the drive, shape (6,)."""
-    signs: OrbitSigns
     defect: float
     """Closure error: (final - initial state) / scale of the state."""
-    error: float
-    """Error bound of the motion, and of the responses of x and p, relative to the fundamental of p: closure
-    and integration error times |(map - I)^-1|."""
-    response_i: Floats
-    """Largest magnitude of x, y, z and p, relative to the drive amplitude, shape (4,)."""
-    response_ii: Floats
-    """Amplitude of x, y, z and p at the drive frequency, relative to the drive amplitude, shape (4,)."""
     outcome: ShootingEnd
 
     @property
