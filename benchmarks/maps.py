@@ -220,11 +220,11 @@ def peer(runs: list[FollowedRun]) -> None:
     print(f"{len(runs)} of them, eight at a time: " + said.format(1e3 * taken, off(found)))
     for tolerance in PEER_TOLERANCES:
         states = [
-            each.end(tolerance, run.state, count / run.drive.frequency_hz)
+            each.end(tolerance, run.motion, count / run.drive.frequency_hz)
             for each, run, count in zip(best, runs, periods, strict=True)
         ]
         pairs = zip(best, runs, strict=True)
-        cost = float(np.mean([each.cost(LANES, tolerance, run.state, PEER_S) for each, run in pairs]))
+        cost = float(np.mean([each.cost(LANES, tolerance, run.motion, PEER_S) for each, run in pairs]))
         told = said.format(1e3 * cost, off(states))
         print(f"heyoka at {tolerance:g}: {told}: {cost / taken:.1f} times as long")
 

@@ -155,7 +155,7 @@ def run_vibench(motion, tolerance, start, span_s):
 
     def job():
         run.follow(span_s)
-        return run.state
+        return run.motion
 
     return job
 

@@ -26,7 +26,7 @@ def follow_run(start, until, tolerance, drive=DRIVE):
     run = FollowedRun(gong2025(), drive, tolerance, start)
     run.follow_tangent()
     seen = run.follow(until, Watch.PEAKS_AND_LINES, Samples(0.0, 2e5, 5))
-    return run.state, seen
+    return run.motion, seen
 
 
 def test_a_free_collision_has_the_duration_and_depth_of_hertz_theory():
@@ -67,7 +67,7 @@ def test_an_interrupted_collision_is_resolved_in_steps():
     for until_s in (1e-5, 2e-5, 1e-4):
         run.follow(until_s)
     by_steps, _ = follow_run(start, 1e-4, 1e-11)
-    assert np.abs((run.state - by_steps) / SCALES).max() < STANDARD
+    assert np.abs((run.motion - by_steps) / SCALES).max() < STANDARD
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.3])

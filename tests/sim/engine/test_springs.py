@@ -38,7 +38,7 @@ def growth(run, span_s, start):
 @pytest.mark.parametrize("level", Accuracy)
 def test_linear_stops_match_the_independent_solution_at_every_accuracy_level(drive, gap_m, level):
     run, span_s = settled_run(drive, gap_m), 3.0 / drive.frequency_hz
-    start = run.state
+    start = run.motion
     truth = independent_state(run.specimen, drive, span_s, start)
     found = integrate(run.specimen, drive, span_s, level, start)
     assert found.impacts.count > 0

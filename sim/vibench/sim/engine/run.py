@@ -321,7 +321,7 @@ class NativeRun(_Run):
         record.structure["steps_left"] = max(left, 0)
         return outcome_of(code, f"to advance to {until_s} s: the end time must be finite")
 
-    def image(self, until_s: float, record: RunRecord) -> tuple[Floats, Floats]:
+    def advance_with_jacobian(self, until_s: float, record: RunRecord) -> tuple[Floats, Floats]:
         """Advance to a time [s]; return the state, (6,), and d(state) / d(state now), (6, 6); NaN on failure.
 
         At a grazing impact on a rigid stop, where no derivative exists, very large numbers are returned.

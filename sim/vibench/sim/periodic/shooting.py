@@ -355,7 +355,7 @@ def flow_derivative(
 ) -> tuple[Floats, Floats]:
     """Return the final state of a run from time zero of the drive, and d(final state) / d(initial state).
 
-    The shapes are (6,) and (6, 6), as in `NativeRun.image`; NaN if the run did not finish.
+    The shapes are (6,) and (6, 6), as in `NativeRun.advance_with_jacobian`; NaN if the run did not finish.
 
     Parameters
     ----------
@@ -369,4 +369,4 @@ def flow_derivative(
         Accuracy of the motion and of its derivative.
     """
     run = NativeRun(specimen, drive, start_motion(state), accuracy.tolerance)
-    return run.image(duration_s, RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, duration_s)))
+    return run.advance_with_jacobian(duration_s, RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, duration_s)))

@@ -70,7 +70,7 @@ def stable_motion(near: FollowedRun, period: int) -> FixedPoint | None:
 
 
 def _fixed_point(near: FollowedRun, period: int) -> FixedPoint | None:
-    run, start, scales = near.copy(min(TOLERANCE, STRICTER * near.tolerance)), near.state, near.scales
+    run, start, scales = near.copy(min(TOLERANCE, STRICTER * near.tolerance)), near.motion, near.scales
     size, gone, exponents = float(np.abs(start / scales).max(initial=1e-300)), np.inf, np.empty(0)
 
     def image(state: Floats) -> tuple[Floats, Floats]:
@@ -86,7 +86,7 @@ def _fixed_point(near: FollowedRun, period: int) -> FixedPoint | None:
         exponents = np.append(exponents, math.log(largest) * run.drive.frequency_hz / period)[-2:]
         if gone < RETURNED * size and len(exponents) == 2:
             distance = float(np.abs((state - start) / scales).max()) / size
-            away = np.linalg.inv(np.eye(6) - scaled)
+            away = np.asarray(np.linalg.inv(np.eye(6) - scaled))
             return FixedPoint(run, away, distance, period, exponents) if largest < 1.0 - NEUTRAL else None
     return None
 
@@ -244,7 +244,8 @@ class Lead:
             return (run.follow(self._until_s, samples=samples),)
         if states.repeats is not None:
             left = (self._until_s - run.time_s) * self._frequency_hz
-            run.pass_over(int(left / states.repeats.period) * states.repeats.period)
+            cycle = states.repeats.period
+            run.pass_over(int(left / cycle) * cycle / self._frequency_hz)
         return tuple(states.path)
 
 

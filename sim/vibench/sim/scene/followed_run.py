@@ -104,20 +104,17 @@ class Stretch:
         return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
 
 
-class FollowedRun:
+class FollowedRun(NativeRun):
     """Motion of a specimen, integrated step by step from a start (initial state).
 
     Raises ValueError when the specimen cannot be simulated from this start.
     """
 
-    def __init__(
-        self, specimen: Specimen, drive: Harmonic, tolerance: float, start: ArrayLike, time_s: float = 0.0
-    ) -> None:
-        self.specimen = specimen
+    def __init__(self, specimen: Specimen, drive: Harmonic, tolerance: float, start: ArrayLike) -> None:
+        super().__init__(specimen, drive, start, tolerance)
         self.drive = drive
         self.outcome = Outcome.REACHED_END
         """Outcome of the last integrated stretch."""
-        self._run = NativeRun(specimen, drive, start_motion(start), tolerance, start_time_s=time_s)
         self.scales = np.repeat([1.0, 2.0 * math.pi * drive.frequency_hz], 3)
         """Scale of each coordinate, shape (6,): 1 for displacements, 2 pi f for velocities."""
         self._metric = energy_metric(specimen)
@@ -127,41 +124,15 @@ class FollowedRun:
         self.tries = 0
         """Number of successive calls of `follow_together` that ended in contact, at most `TRIES`."""
 
-    @property
-    def tolerance(self) -> float:
-        """Relative tolerance of a time step in contact."""
-        return self._run.tolerance
-
-    @property
-    def time_s(self) -> float:
-        """Current time of the motion [s]."""
-        return self._run.time_s
-
-    @property
-    def state(self) -> Floats:
-        """Current x, y, z, vx, vy, vz, shape (6,)."""
-        return self._run.motion
-
-    def copy(self, tolerance: float | None = None) -> Self:
-        """Return an independent copy, optionally with another tolerance."""
-        twin = object.__new__(type(self))  # this is faster than copy.copy
-        twin.__dict__.update(self.__dict__, _run=self._run.copy(tolerance))
-        return twin
-
-    def pass_over(self, drive_periods: int) -> None:
-        """Skip drive periods of a repeating motion: increase the time and keep the state."""
-        self._run.pass_over(drive_periods / self.drive.frequency_hz)
+    def place(self, motion: ArrayLike) -> None:
+        """Set the current state, shape (6,); raise ValueError if this state is not allowed."""
+        super().place(start_motion(motion))
 
     @property
     def periods(self) -> int | None:
         """Number of drive periods since time zero; None between two whole periods."""
         whole = round(self.time_s * self.drive.frequency_hz)
         return whole if whole / self.drive.frequency_hz == self.time_s else None
-
-    @property
-    def is_in_flight(self) -> bool:
-        """Whether m1 touches no stop at present."""
-        return self._run.is_in_flight
 
     def batch_periods(self, until_s: float) -> int:
         """Return the number of drive periods until a time [s]; 0 or less if no batch can integrate them."""
@@ -174,7 +145,7 @@ class FollowedRun:
     def _batch_stretch(self, start_s: float, before: float, motion: BatchedMotion) -> Stretch:
         """Return the stretch that a batch integrated from ``start_s``, when `_size` was ``before``."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
-        self.cost_s += nominal_cost_s(self._run, self.specimen.contact, length_s, motion.impacts)
+        self.cost_s += nominal_cost_s(self, self.specimen.contact, length_s, motion.impacts)
         samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, count)
         return Stretch(
             *(start_s, self.time_s, self.outcome, motion.impacts, samples, motion.states),
@@ -184,21 +155,17 @@ class FollowedRun:
     def follow_tangent(self) -> None:
         """Propagate a tangent vector, in a direction without symmetry, from now on."""
         scales = min(self.specimen.gaps_m) * self.scales
-        self._run.carry((scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
+        self.carry((scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
 
     def drop_tangent(self) -> None:
         """Propagate no tangent vector from now on."""
-        self._run.carry(np.empty((0, DIRECTIONS)))
+        self.carry(np.empty((0, DIRECTIONS)))
 
     def with_push(self, push: Floats) -> Self:
         """Return a copy of the motion whose current state is changed by ``push``, shape (6,)."""
         twin = self.copy()
-        twin.place(self.state + push)
+        twin.place(self.motion + push)
         return twin
-
-    def place(self, state: Floats) -> None:
-        """Set the current state, shape (6,); raise ValueError if this state is not allowed."""
-        self._run.place(start_motion(state))
 
     def follow(
         self,
@@ -209,7 +176,7 @@ class FollowedRun:
         """Integrate to a time [s] and return the stretch; a run that has failed is not advanced."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
-        counts_as = TANGENT_STEPS if len(self._run.growth) else 1
+        counts_as = TANGENT_STEPS if len(self.growth) else 1
         steps = self._steps_left // counts_as
         record = RunRecord(
             most_impacts(MAX_IMPACT_RATE_HZ, until_s - start_s),
@@ -220,11 +187,11 @@ class FollowedRun:
         )
         record.watch(observe)
         if self.outcome is Outcome.REACHED_END:
-            self.outcome = self._run.advance(until_s, record)
+            self.outcome = self.advance(until_s, record)
         made = steps - record.steps_left
         self._steps_left -= counts_as * made
         self.cost_s += nominal_cost_s(
-            self._run, self.specimen.contact, self.time_s - start_s, record.impacts, made, kept.count
+            self, self.specimen.contact, self.time_s - start_s, record.impacts, made, kept.count
         )
         return Stretch(
             start_s=start_s,
@@ -237,7 +204,7 @@ class FollowedRun:
             area_p=record.area_p,
             samples=kept,
             # Because of rounding, the last samples may lie just after the end of the stretch.
-            states=record.all_samples(self.state if self.outcome is Outcome.REACHED_END else 0.0),
+            states=record.all_samples(self.motion if self.outcome is Outcome.REACHED_END else 0.0),
             growth=self._size() - before,
         )
 
@@ -247,7 +214,7 @@ class FollowedRun:
         until_s = (made + drive_periods) / self.drive.frequency_hz
         steps = self._steps_left // TANGENT_STEPS
         record = RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, until_s - self.time_s), steps=steps)
-        image = self._run.copy().image(until_s, record)
+        image = self.copy().advance_with_jacobian(until_s, record)
         self._steps_left -= TANGENT_STEPS * (steps - record.steps_left)
         return image
 
@@ -257,12 +224,12 @@ class FollowedRun:
         The norm is the square root of the vector's energy in the linear system. Only contact can increase
         this energy. An exchange between displacement and velocity therefore does not count as growth.
         """
-        if len(self._run.growth) == 0:
+        if len(self.growth) == 0:
             return math.nan
-        change = self._run.changes[0]
+        change = self.changes[0]
         # With strong damping, the energy may be below the smallest float.
         energy = max(change @ self._metric @ change, sys.float_info.min)
-        return 0.5 * math.log(energy) + float(self._run.growth[0])
+        return 0.5 * math.log(energy) + float(self.growth[0])
 
 
 TRIES = 8
@@ -298,7 +265,7 @@ def follow_together(
 def _batch(runs: Sequence[FollowedRun], periods: Sequence[int], observe: Watch) -> list[Stretch | None]:
     """Integrate motions of one specimen in flight in a batch; None for a failed motion."""
     begun = [(run.time_s, run._size()) for run in runs]  # noqa: SLF001 - of the same file
-    motions = follow_batch([run._run for run in runs], periods, observe) if runs else []  # noqa: SLF001
+    motions = follow_batch(runs, periods, observe) if runs else []
     return [
         None if motion is None else run._batch_stretch(*start, motion)  # noqa: SLF001
         for run, start, motion in zip(runs, begun, motions, strict=True)

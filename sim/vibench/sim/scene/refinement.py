@@ -391,7 +391,7 @@ class _Refinement:
         if found is None:
             return None
         run, away, strict = found.run, found.away, found.run.copy(TIGHTEST)
-        off = (strict.image(period)[0] - strict.state) / self._scales
+        off = (strict.image(period)[0] - strict.motion) / self._scales
         strict = strict.with_push(away @ off * self._scales)
         windows = [self._observe_next(each.copy(), period) for each in (run, strict)]
         if windows[0] is None or windows[1] is None:
@@ -423,7 +423,7 @@ class _Refinement:
             period=orbit.period,
             settled_s=self._main.time_s,
             ended=f"it repeats after {orbit.period} drive period(s)",
-            final_state=state_of(orbit.run.state),
+            final_state=state_of(orbit.run.motion),
             memory=StartMemory.KEPT,
             section=self._section(orbit.section),
         )
@@ -468,7 +468,7 @@ class _Refinement:
         found = replace(
             found,
             ended=f"observed from {run.time_s - window.length_s:.4g} to {run.time_s:.4g} s",
-            final_state=state_of(run.state),
+            final_state=state_of(run.motion),
             memory=StartMemory.UNKNOWN if is_parted else StartMemory.KEPT,
             integration_error=float(off.max()),
             section=self._section(states_of(window.stretches)),
@@ -622,7 +622,7 @@ class _Refinement:
             motion=MotionKind.PERIODIC if is_periodic else self._kind or MotionKind.UNDECIDED,
             period=first.period if first is not None and is_periodic else None,
             ended=f"mean of {len(starts)} starts, each {each_observed}",
-            final_state=state_of(starts[0].run.state),
+            final_state=state_of(starts[0].run.motion),
             memory=StartMemory.LOST,
             scatter=float(responses[:, 0].std(ddof=1) / mean[0]),
             section=self._section(self._first_section),
@@ -684,7 +684,7 @@ class _Refinement:
             window_s=window_s,
             ended="",
             start=self._scene.start.name,
-            final_state=state_of(self._main.state),
+            final_state=state_of(self._main.motion),
             outcome=Outcome.REACHED_END,
             method=self._method,
             accuracy=self._scene.accuracy.value,

@@ -357,7 +357,7 @@ class _StartedScene:
         turns = math.fmod(drive.frequency_hz * run.time_s, 1.0)
         phase = math.fmod(2.0 * math.pi * turns + drive.phase_rad, 2.0 * math.pi)
         return ExponentRun(
-            *(scene.specimen, replace(drive, phase_rad=phase), scene.accuracy, EXPONENT_S, 0.0, run.state),
+            *(scene.specimen, replace(drive, phase_rad=phase), scene.accuracy, EXPONENT_S, 0.0, run.motion),
             precision=Precision(*EXPONENT_PRECISION),
         )
 
@@ -455,7 +455,7 @@ class _StartedScene:
             lyapunov_per_s=rate,
             lyapunov_error_per_s=rate_error,
             start=scene.start.name,
-            final_state=state_of(run.state),
+            final_state=state_of(run.motion),
             outcome=run.outcome,
             method=self._method,
             accuracy=scene.accuracy.value,

@@ -224,7 +224,7 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
     """Return whether the states of two runs agree within `PARTED` times the gap; False if a run failed."""
     if not one.outcome is other.outcome is Outcome.REACHED_END:
         return False
-    apart = np.abs(one.state - other.state) / one.scales
+    apart = np.abs(one.motion - other.motion) / one.scales
     return bool(np.max(apart) < PARTED * min(scene.specimen.gaps_m))
 
 
