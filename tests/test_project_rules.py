@@ -12,15 +12,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 26_705,
+    "acquisition": 26_630,
     "analysis": 32_917,
-    "cli": 4_886,
+    "cli": 4_879,
     "extensions": 3_354,
-    "gui": 11_808,
+    "gui": 11_795,
     "native": 6_874,
     "sim": 20_617,
     "studies": 2_920,
-    "virtual_rig": 6_506,
+    "virtual_rig": 6_503,
 }
 """Lines of Python, stubs, templates and C++, without the C++ test program; their sum only decreases."""
 

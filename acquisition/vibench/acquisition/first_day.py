@@ -270,7 +270,9 @@ def configure(
         for question in questions:
             text = _valid_answer(text, question, question.choices(seen), ask, note, refuse)
         try:
-            text = _with_driver(_with_product(text, seen, note), note)
+            device = value_in(text, "daq.device").strip('"')
+            product = next((each.product for each in seen.daq_devices if each.name == device), "")
+            text = _with_driver(with_answer(text, "daq.product", product, note) if product else text, note)
             from_toml(tomllib.loads(text), Rig, target)
             break
         except ConfigurationError as error:
@@ -328,12 +330,6 @@ def _write(target: Path, text: str) -> None:
             coming.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give a new path") from error
-
-
-def _with_product(text: str, seen: InstrumentList, note: str) -> str:
-    device = value_in(text, "daq.device").strip('"')
-    product = next((each.product for each in seen.daq_devices if each.name == device), "")
-    return with_answer(text, "daq.product", product, note) if product else text
 
 
 def _with_driver(text: str, note: str) -> str:

@@ -3,7 +3,6 @@
 import math
 import shlex
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -55,7 +54,11 @@ def show_catalogue(
     if as_json:
         print_json({"folder": str(folder.resolve()), "recordings": [asdict(each) for each in entries]})
     elif entries:
-        _show(entries)
+        rows = [COLUMNS, *(_row(each) for each in entries)]
+        widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
+        for row in rows:
+            line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
+            console.print(line.rstrip())
     else:
         console.print(f"{folder} contains no recordings")
     for each in entries:
@@ -64,14 +67,6 @@ def show_catalogue(
             errors.print(f"error: {where}{each.reason}")
     if any(each.is_bad for each in entries):
         raise typer.Exit(ExitCode.FAILED)
-
-
-def _show(entries: Sequence[CatalogueEntry]) -> None:
-    rows = [COLUMNS, *(_row(each) for each in entries)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
-    for row in rows:
-        line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        console.print(line.rstrip())
 
 
 def _row(entry: CatalogueEntry) -> tuple[str, ...]:

@@ -142,7 +142,12 @@ def predict(
         print_json(document)
     else:
         _print_result(points, Observable.LYAPUNOV in request.observe)
-        _print_duration(points, request)
+        # If the duration is fixed, print for how long chaotic points were simulated.
+        is_fixed = request.target is None and request.duration_s != AUTO
+        if is_fixed and any(each.motion is MotionKind.CHAOTIC for each in points):
+            console.print(
+                f"Chaotic over {request.duration_s:g} s; --duration auto tests whether the chaos lasts."
+            )
         if target_text:
             console.print(target_text)
     if explain:
@@ -251,13 +256,6 @@ def _print_result(points: Sequence[ScenePrediction], has_exponents: bool) -> Non
     motions = _motions_table(points)
     if motions is not None:
         print_table(motions)
-
-
-def _print_duration(points: Sequence[ScenePrediction], study: Study) -> None:
-    """Print for how long chaotic points were simulated, if the duration is fixed."""
-    is_fixed = study.target is None and study.duration_s != AUTO
-    if is_fixed and any(each.motion is MotionKind.CHAOTIC for each in points):
-        console.print(f"Chaotic over {study.duration_s:g} s; --duration auto tests whether the chaos lasts.")
 
 
 def _share_text(point: ScenePrediction) -> str:

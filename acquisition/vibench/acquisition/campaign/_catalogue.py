@@ -6,7 +6,7 @@ is created again.
 
 import os
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import astuple, dataclass, fields, replace
 from enum import StrEnum
@@ -23,7 +23,6 @@ from ..recording import (
     JOURNAL_SUFFIX,
     PART_SUFFIX,
     SUFFIX,
-    NotedSeal,
     Recording,
     RecordingState,
     SealCheck,
@@ -239,7 +238,12 @@ def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntr
         try:
             found = path.stat()
             size_bytes = found.st_size
-            stamp = _stamp(found, noted(path.parent).get(path.name, ()))
+            # The stamp changes when the file is written, or when its seal in a journal changes. It contains
+            # the file system's time of change, which programs cannot set back.
+            seals = "".join(
+                f" {each.seal} {each.attempt_seal}" for each in noted(path.parent).get(path.name, ())
+            )
+            stamp = f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}{seals}"
         except FileNotFoundError:  # the recording was finished meanwhile and has its final name
             continue
         except OSError:  # for example a link to itself; its entry says "unreadable"
@@ -257,25 +261,6 @@ def _update(folder: Path, connection: sqlite3.Connection) -> tuple[CatalogueEntr
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))
     connection.execute("COMMIT")
-    return _entries(connection)
-
-
-def _stamp(found: os.stat_result, noted: Sequence[NotedSeal]) -> str:
-    """Return a value that changes when the file is written, or when its seal in a journal changes.
-
-    The value includes the file system's time of change, which programs cannot set back.
-    """
-    seals = "".join(f" {each.seal} {each.attempt_seal}" for each in noted)
-    return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}{seals}"
-
-
-def recordings_below(folder: Path) -> Iterator[Path]:
-    """Yield every recording of a folder and its subfolders, finished or not."""
-    yield from sorted(folder.rglob(f"*{SUFFIX}"))
-    yield from sorted(folder.rglob(f"*{SUFFIX}{PART_SUFFIX}"))
-
-
-def _entries(connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
     columns = ", ".join(_COLUMNS)
     rows = connection.execute(
         f"SELECT {columns} FROM recordings ORDER BY started_utc, path"  # noqa: S608 - names of fields
@@ -288,6 +273,12 @@ def _entries(connection: sqlite3.Connection) -> tuple[CatalogueEntry, ...]:
         else replace(each, verdict=f"{each.verdict}; {copy_sentence(first, first.path, each)}")
         for each, first in zip(entries, firsts, strict=True)
     )
+
+
+def recordings_below(folder: Path) -> Iterator[Path]:
+    """Yield every recording of a folder and its subfolders, finished or not."""
+    yield from sorted(folder.rglob(f"*{SUFFIX}"))
+    yield from sorted(folder.rglob(f"*{SUFFIX}{PART_SUFFIX}"))
 
 
 MISSING = "missing"

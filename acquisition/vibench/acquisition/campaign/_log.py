@@ -165,19 +165,17 @@ class StatusLine(ClosedOnLeaving):
         self._written = monotonic()
         counts = ", ".join(f"{number} {word}" for word, number in self._counts.items())
         utc = datetime.now(UTC).isoformat(timespec="seconds")
-        line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {self._remaining_time()} left)"
+        # The remaining time is its planned value times this session's ratio of real to planned time.
+        made_s = self._made_s + self._point_s
+        pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
+        left = timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
+        line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {left} left)"
         self._beside.do(lambda: self._append(f"{printable(line)}\n"))
 
     def _append(self, line: str) -> None:
         # If a full disk prevents storing a status line, the measurement must still continue.
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)
-
-    def _remaining_time(self) -> timedelta:
-        """Return the remaining time: its planned value times this session's ratio of real to planned time."""
-        made_s = self._made_s + self._point_s
-        pace = (monotonic() - self._begun) / made_s if made_s > 1.0 else 1.0
-        return timedelta(seconds=round(max(0.0, self._left_s - made_s) * pace))
 
 
 class Security(StrEnum):

@@ -292,7 +292,27 @@ def planned_recordings(
     """
     points = campaign.points()
     if existing is ExistingRecordings.RESUME:
-        return _resumable(campaign, points, folder)
+        path = journal_path(folder, campaign.name)
+        if not journal_exists(path):
+            kept = find_recordings(points, folder, SealDepth.QUICK)
+            found = {name: each.path for name, each in kept.items() if each.is_complete}
+            wanted = [(each.name, each.measurement) for each in points]
+        else:
+            known = read_journal(path)
+            found = {
+                each.name: folder / each.file
+                for each in known
+                if each.file
+                for kept in [read_attempt(folder / each.file, each.measurement, SealDepth.QUICK)]
+                if (kept.is_complete and kept.is_of_this_plan)
+                or (each.state is JournalPointState.DONE and not kept.damage)
+            }
+            wanted = [(each.name, each.measurement) for each in known]
+        return tuple(
+            PlannedRecording(name, measurement, done or next_attempt(folder, name), done is not None)
+            for name, measurement in wanted
+            for done in [found.get(name)]
+        )
     require_new(campaign, points, folder)
     return tuple(
         PlannedRecording(each.name, each.measurement, next_attempt(folder, each.name)) for each in points
@@ -409,27 +429,3 @@ def require_new(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> 
             f"{shown} {verb} already, and nothing is ever overwritten. "
             "Nothing was recorded; give another folder, or resume the campaign"
         )
-
-
-def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> tuple[PlannedRecording, ...]:
-    path = journal_path(folder, campaign.name)
-    if not journal_exists(path):
-        kept = find_recordings(points, folder, SealDepth.QUICK)
-        found = {name: each.path for name, each in kept.items() if each.is_complete}
-        wanted = [(each.name, each.measurement) for each in points]
-    else:
-        known = read_journal(path)
-        found = {
-            each.name: folder / each.file
-            for each in known
-            if each.file
-            for kept in [read_attempt(folder / each.file, each.measurement, SealDepth.QUICK)]
-            if (kept.is_complete and kept.is_of_this_plan)
-            or (each.state is JournalPointState.DONE and not kept.damage)
-        }
-        wanted = [(each.name, each.measurement) for each in known]
-    return tuple(
-        PlannedRecording(name, measurement, done or next_attempt(folder, name), done is not None)
-        for name, measurement in wanted
-        for done in [found.get(name)]
-    )

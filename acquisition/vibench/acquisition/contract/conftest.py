@@ -35,8 +35,17 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
     return None
 
 
-def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return one bench for each kind of plug-in called ``name``; refuse a name that no bench uses."""
+def no_bench_text(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
+    """Return the error text for an instrument that no bench names."""
+    who = "no shipped virtual bench uses" if given is None else f"{given} does not use"
+    kinds_in_words = " or ".join(each.value for each in kinds)
+    return f"{who} {name!r} as one of {kinds_in_words}; use --vibench-bench to give a bench that does"
+
+
+def pytest_collection_modifyitems(config: pytest.Config) -> None:
+    """Report an error in the command-line options once, before the first test."""
+    name = config.getoption("--vibench-instrument")
+    given = config.getoption("--vibench-bench")
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing; give the name of an entry point, such as afg1022x"
@@ -50,21 +59,7 @@ def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | N
         raise pytest.UsageError(str(error)) from None
     if not any(found.values()):
         raise pytest.UsageError(no_bench_text(name, given, kinds))
-    return found
-
-
-def no_bench_text(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
-    """Return the error text for an instrument that no bench names."""
-    who = "no shipped virtual bench uses" if given is None else f"{given} does not use"
-    kinds_in_words = " or ".join(each.value for each in kinds)
-    return f"{who} {name!r} as one of {kinds_in_words}; use --vibench-bench to give a bench that does"
-
-
-def pytest_collection_modifyitems(config: pytest.Config) -> None:
-    """Report an error in the command-line options once, before the first test."""
-    config.stash[_RIGS] = chosen_rigs(
-        config.getoption("--vibench-instrument"), config.getoption("--vibench-bench")
-    )
+    config.stash[_RIGS] = found
 
 
 @pytest.fixture(scope="module")

@@ -211,7 +211,12 @@ class PhaseSearch:
             low = max(below, key=lambda each: each.frequency_hz)
             high = min(above, key=lambda each: each.frequency_hz)
             if low.frequency_hz < high.frequency_hz:
-                return _secant(low, high)
+                # Keep the zero of the secant away from both ends of the bracket, so that the bracket shrinks.
+                share = low.error_deg / (low.error_deg - high.error_deg)
+                edge = 0.05
+                return low.frequency_hz + min(max(share, edge), 1 - edge) * (
+                    high.frequency_hz - low.frequency_hz
+                )
         return self._clip(self._outwards(last))
 
     def resonance(self, sensor_phase_deg: float) -> PhaseResonance:
@@ -252,10 +257,3 @@ class PhaseSearch:
 
     def _clip(self, frequency_hz: float) -> float:
         return min(max(frequency_hz, self.low_hz), self.high_hz)
-
-
-def _secant(low: PhaseError, high: PhaseError) -> float:
-    """Return the zero of the secant, kept away from both ends of the bracket so that the bracket shrinks."""
-    share = low.error_deg / (low.error_deg - high.error_deg)
-    edge = 0.05
-    return low.frequency_hz + min(max(share, edge), 1 - edge) * (high.frequency_hz - low.frequency_hz)

@@ -250,7 +250,9 @@ def judgement_of(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgeme
             continue
         if period == 1:
             unsettled = replace(figures, steadiness=Steadiness.UNSETTLED, period=0)
-        if _repeats(figures, rule.tolerance):
+        allowed = _limit(figures, rule.tolerance)
+        # Noise also shifts the means of the window's thirds, so the limit for ``remaining`` includes noise.
+        if figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed:
             return figures
     if len(points) >= rule.aperiodic_periods and unsettled.scatter > _limit(unsettled, rule.tolerance):
         return _stationary(points[-rule.aperiodic_periods :], unsettled)
@@ -307,12 +309,6 @@ def _remaining(early: float, late: float, by_chance: float) -> float:
         return late
     ratio = min(late / early, _SLOWEST) if early > 0 else _SLOWEST
     return late * max(1.0, ratio / (1 - ratio))
-
-
-def _repeats(figures: Judgement, tolerance: float) -> bool:
-    allowed = _limit(figures, tolerance)
-    # Noise also shifts the means of the window's thirds, so the limit for ``remaining`` includes noise.
-    return figures.scatter + _SURE * figures.scatter_u <= allowed and figures.remaining <= allowed
 
 
 def _limit(figures: Judgement, tolerance: float) -> float:

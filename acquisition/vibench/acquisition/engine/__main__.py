@@ -37,7 +37,12 @@ def main() -> None:
     engine = Engine(options.attendance)
     jobs = JobQueue(engine)
     handler = RequestHandler(engine, jobs)
-    _handle_signals(handler)
+
+    def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        handler.end(Cause.TERMINATED, f"{signal_name(number)}: ended by the system")
+
+    for number in stop_signals():
+        signal.signal(number, on_signal)
     with serving(handler, options.what, options.host) as server:
         line = json.dumps(server.address.model_dump())
         print(line, flush=True)  # noqa: T201 - this line is the handshake with the parent program
@@ -47,14 +52,6 @@ def main() -> None:
             arguments = (handler, options.forgotten_s)
             Thread(target=_end_when_unused, args=arguments, name="engine forgotten", daemon=True).start()
         jobs.run()
-
-
-def _handle_signals(handler: RequestHandler) -> None:
-    def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        handler.end(Cause.TERMINATED, f"{signal_name(number)}: ended by the system")
-
-    for number in stop_signals():
-        signal.signal(number, on_signal)
 
 
 def _end_when_unused(handler: RequestHandler, after_s: float) -> None:

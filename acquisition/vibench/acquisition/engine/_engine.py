@@ -195,7 +195,9 @@ class Engine:
             self.published.note_failure(str(error))
             self._fails(error, EngineState.READY)
             raise
-        self.published.messages.info(_campaign_in_words(point_results))
+        counts = Counter(point_result.outcome for point_result in point_results)
+        text = ", ".join(f"{counts[each]} {each.value}" for each in PointOutcome if counts[each])
+        self.published.messages.info(f"Campaign ended: {text or 'stopped before its first point'}")
         self.published.enter(EngineState.READY)
         return point_results
 
@@ -244,12 +246,6 @@ class Engine:
         finally:
             self.published.bench(None)
             self.turn_twin(TwinSwitch.OFF)
-
-
-def _campaign_in_words(point_results: tuple[PointResult, ...]) -> str:
-    counts = Counter(point_result.outcome for point_result in point_results)
-    text = ", ".join(f"{counts[each]} {each.value}" for each in PointOutcome if counts[each])
-    return f"Campaign ended: {text or 'stopped before its first point'}"
 
 
 Job = Callable[[], object]

@@ -259,7 +259,12 @@ class PublishedState:
             ),
             overloads=self._overloads,
         )
-        self._look_at_disk()
+        # Read the free disk space in another thread: an unresponsive folder must not delay a stop.
+        if monotonic() < self._disk_due_s or self._beside.is_busy:
+            return
+        self._disk_due_s = monotonic() + DISK_INTERVAL_S
+        folder = self._folder
+        self._beside.do(lambda: self._put(disk_free_bytes=_free_bytes(folder)))
 
     def twin(self, status: TwinStatus | None) -> None:
         """Set the live twin's report; None if there is no twin."""
@@ -311,14 +316,6 @@ class PublishedState:
             plan=self._plans.get(progress.name, ""),
             until=run.until,
         )
-
-    def _look_at_disk(self) -> None:
-        """Read the free disk space in another thread: an unresponsive folder must not delay a stop."""
-        if monotonic() < self._disk_due_s or self._beside.is_busy:
-            return
-        self._disk_due_s = monotonic() + DISK_INTERVAL_S
-        folder = self._folder
-        self._beside.do(lambda: self._put(disk_free_bytes=_free_bytes(folder)))
 
     def _put_rows(self, rows: tuple[RowStatus, ...]) -> None:
         self._put(rows=rows, rows_number=self._status.rows_number + 1)

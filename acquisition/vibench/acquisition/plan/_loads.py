@@ -67,7 +67,7 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
     images of the generator's hold. Streamed noise is Gaussian: its peak is the crest factor times the rms
     value. Ramps stay below the steady state because of their half-cosine shape.
     """
-    terminal_v = terminal_volts(excitation, rig)
+    terminal_v = 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
     model = RigModel(rig)
     # Every tone, waveform and stream source of the plan once, at its highest level.
     tones, waveforms, sources = _split_by_kind(step.play for step in excitation.loudest_steps())
@@ -87,11 +87,6 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
         return max([*loads, *(play.load(quantity) for play in broad)], key=lambda load: load.peak)
 
     return {quantity: worst(quantity) for quantity in BaseQuantity}
-
-
-def terminal_volts(excitation: Excitation, rig: Rig) -> float:
-    """Return the peak voltage at the generator's terminal for the largest setting of the plan [V]."""
-    return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
 
 
 def _split_by_kind(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[GaussianBand]]:
@@ -193,7 +188,7 @@ def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float
     For other plans, the amplitude follows from the rig's model with specimen (noise: a sine of equal rms).
     """
     levels = [excitation.level_at(float(each)) for each in frequency_hz]
-    model, terminal_v = RigModel(rig), terminal_volts(excitation, rig)
+    model, terminal_v = RigModel(rig), 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
     amplitudes_m = []
     noise_m: float | None = None
     for level, at_hz in zip(levels, frequency_hz, strict=True):

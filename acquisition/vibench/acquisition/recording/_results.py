@@ -109,7 +109,20 @@ def read_results(file: h5py.File) -> dict[str, SavedResult]:
         seal = check_result(group, None)
         if seal.state is SealState.DAMAGED:
             raise RecordingError(f"the result {name!r} is damaged ({seal.sentence})")
-        found[name] = _read_result(name, group)
+        attributes = read_attributes(group)
+        found[name] = SavedResult(
+            name=name,
+            arrays=_read_arrays(group),
+            settings=json_object(read_text_dataset(group, SETTINGS_JSON)),
+            saved_utc=str(attributes["saved_utc"]),
+            software_version=str(attributes["software_version"]),
+            software_commit=str(attributes["software_commit"]),
+            raw_sha256={
+                key.removeprefix(RAW_SHA256): str(value)
+                for key, value in attributes.items()
+                if key.startswith(RAW_SHA256)
+            },
+        )
     return found
 
 
@@ -160,23 +173,6 @@ def _real_parts(key: str, values: NDArray[Any]) -> list[tuple[str, NDArray[Any],
             (key + IMAG_SUFFIX, values.imag, {COMPLEX_PART: "imag"}),
         ]
     return [(key, values.astype(np.int8) if values.dtype == np.bool_ else values, {})]
-
-
-def _read_result(name: str, group: h5py.Group) -> SavedResult:
-    attributes = read_attributes(group)
-    return SavedResult(
-        name=name,
-        arrays=_read_arrays(group),
-        settings=json_object(read_text_dataset(group, SETTINGS_JSON)),
-        saved_utc=str(attributes["saved_utc"]),
-        software_version=str(attributes["software_version"]),
-        software_commit=str(attributes["software_commit"]),
-        raw_sha256={
-            key.removeprefix(RAW_SHA256): str(value)
-            for key, value in attributes.items()
-            if key.startswith(RAW_SHA256)
-        },
-    )
 
 
 def _read_arrays(group: h5py.Group) -> dict[str, ResultArray]:

@@ -171,7 +171,13 @@ class RecordingWriter:
         )
         gap = block.first_sample - self.samples
         end = block.first_sample + counts.shape[1]
-        self._require_capacity(end)
+        if end > self._places.capacity:
+            raise RecordingError(
+                f"The recording is full: the block ends at sample {end}, but only {self._places.capacity} "
+                f"samples fit (planned: {self._header.expected_samples}, plus a margin). The {self.samples} "
+                "samples recorded so far are kept; plan a longer measurement, or leave its length open "
+                "(expected_samples=None)."
+            )
         self._reserve_up_to(end)
         if gap:
             self._fill_gap(self.samples, block.first_sample)
@@ -269,15 +275,6 @@ class RecordingWriter:
             raise RecordingError(
                 f"Counts of shape {made.shape} and type {made.dtype} were given with volts of shape"
                 f" {block.volts.shape}; they must be int32 and of the same shape. The block was not recorded."
-            )
-
-    def _require_capacity(self, end: int) -> None:
-        if end > self._places.capacity:
-            raise RecordingError(
-                f"The recording is full: the block ends at sample {end}, but only {self._places.capacity} "
-                f"samples fit (planned: {self._header.expected_samples}, plus a margin). The {self.samples} "
-                "samples recorded so far are kept; plan a longer measurement, or leave its length open "
-                "(expected_samples=None)."
             )
 
     def _reserve_up_to(self, end: int) -> None:

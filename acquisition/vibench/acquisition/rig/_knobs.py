@@ -32,23 +32,6 @@ def sensor_name(config: ChannelConfig) -> str:
     return "wire" if config.role.quantity == "voltage" else "transducer" if "." in table else table
 
 
-def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Return the properties of the sensor at an input.
-
-    Raises ConfigurationError when no package provides the sensor, or the sensor measures a quantity other
-    than the channel's. Raises BrokenPromise when the plug-in of a sensor fails or returns impossible values.
-    """
-    name = sensor_name(config)
-    facts = cast("Sensor", driver_of(PlugInKind.SENSOR, name, Sensor))(rig, config)
-    quantity, unit = config.role.quantity, config.role.unit
-    if (facts.quantity, facts.unit) != (quantity, unit):
-        raise ConfigurationError(
-            f"the sensor {name!r} of {config.physical} measures {facts.quantity} in {facts.unit!r}, but "
-            f"{config.role.value} records {quantity} in {unit!r}; give the channel another role or sensor"
-        )
-    return facts
-
-
 def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """Return the properties of a wire as a sensor: one volt per volt, before the channel's attenuation."""
     if config.role is Role.AMPLIFIER_VOLTAGE:
@@ -111,7 +94,15 @@ def channels_of(rig: Rig) -> tuple[Channel, ...]:
 
 
 def _channel(rig: Rig, config: ChannelConfig) -> Channel:
-    sensor = sensor_of(rig, config)
+    # Raises BrokenPromise when the plug-in of a sensor fails or returns impossible values.
+    name = sensor_name(config)
+    sensor = cast("Sensor", driver_of(PlugInKind.SENSOR, name, Sensor))(rig, config)
+    quantity, unit = config.role.quantity, config.role.unit
+    if (sensor.quantity, sensor.unit) != (quantity, unit):
+        raise ConfigurationError(
+            f"the sensor {name!r} of {config.physical} measures {sensor.quantity} in {sensor.unit!r}, but "
+            f"{config.role.value} records {quantity} in {unit!r}; give the channel another role or sensor"
+        )
     return Channel(
         role=config.role,
         physical=f"{rig.daq.device}/{config.physical}",
@@ -204,7 +195,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
     """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
-        sheet = load_knob_sheet(path)
+        sheet = load_toml(path, KnobSheet)
         age = datetime.now(UTC) - sheet.confirmed
         if not timedelta(0) <= age <= valid:
             raise CheckFailed(
@@ -230,13 +221,8 @@ def confirm_knobs_of(sheet: KnobSheet | None, origin: str, knobs: tuple[Knob, ..
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
     """Save a sheet, or replace an older sheet; raises ConfigurationError if the old file is no sheet."""
     if path.exists():
-        load_knob_sheet(path)
+        load_toml(path, KnobSheet)
     save_toml(sheet, path)
-
-
-def load_knob_sheet(path: Path) -> KnobSheet:
-    """Return a saved sheet; raises ConfigurationError with file, key and allowed values."""
-    return load_toml(path, KnobSheet)
 
 
 def _knob_text(knob: Knob) -> str:
@@ -262,11 +248,6 @@ class Calibration:
     valid_days: int
 
     @property
-    def is_to_come(self) -> bool:
-        """Whether the calibration date is in the future, which is an error."""
-        return self.age_days < 0
-
-    @property
     def is_valid(self) -> bool:
         """Whether the calibration is valid today; a date in the future is invalid."""
         return 0 <= self.age_days <= self.valid_days
@@ -274,12 +255,12 @@ class Calibration:
     @property
     def advice(self) -> str:
         """Advice on what to do about an invalid calibration."""
-        if self.is_to_come:
+        if self.age_days < 0:
             return "the date is in the future: enter the certificate's date in the configuration"
         return "have it calibrated, and enter the date in the configuration"
 
     def __str__(self) -> str:
-        when = "a day in the future" if self.is_to_come else f"{self.age_days} days ago"
+        when = "a day in the future" if self.age_days < 0 else f"{self.age_days} days ago"
         return f"{self.what} was calibrated on {self.calibrated}, {when}"
 
 

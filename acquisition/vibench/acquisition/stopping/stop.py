@@ -23,10 +23,6 @@ class StopLevel(StrEnum):
     OFF = "off"
     """Switch the output off at once, with a step."""
 
-    def is_harder_than(self, other: "StopLevel") -> bool:
-        """Return whether this level ends the drive sooner than ``other`` does."""
-        return _HARDNESS[self] > _HARDNESS[other]
-
 
 _HARDNESS = {level: number for number, level in enumerate(StopLevel)}
 
@@ -151,7 +147,7 @@ class StopSwitch:
     def harder_than(self, level: StopLevel) -> StopRequest | None:
         """Return the requested stop if it is harder than ``level``, otherwise None."""
         request = self.request
-        return request if request is not None and request.level.is_harder_than(level) else None
+        return request if request is not None and _HARDNESS[request.level] > _HARDNESS[level] else None
 
 
 class DrivesOn:

@@ -199,7 +199,14 @@ class QuantityEdit(QAbstractSpinBox):
             self.complaint, self._value_to_confirm = str(error), None
         else:
             if self._is_far(value) and not (self._is_confirmed and value == self._value_to_confirm):
-                self._ask_about(value)
+                assert value is not None
+                assert self._value is not None
+                self._value_to_confirm = value
+                self.complaint = (
+                    f"{quantity_text(value, self._unit)} is {abs(value / self._value):.3g} times the last "
+                    f"value, {quantity_text(self._value, self._unit)}; press Return again to accept it, or "
+                    "type another"
+                )
             else:
                 self.show_content(value)
         if (self._value, self.complaint) != before:
@@ -210,15 +217,6 @@ class QuantityEdit(QAbstractSpinBox):
             return False
         times = abs(value / self._value)
         return not 1.0 / MOST_TIMES < times < MOST_TIMES
-
-    def _ask_about(self, value: float | int | None) -> None:
-        assert value is not None
-        assert self._value is not None
-        self._value_to_confirm = value
-        self.complaint = (
-            f"{quantity_text(value, self._unit)} is {abs(value / self._value):.3g} times the last value, "
-            f"{quantity_text(self._value, self._unit)}; press Return again to accept it, or type another"
-        )
 
     def _read(self, text: str) -> float | int | None:
         if not text.strip():

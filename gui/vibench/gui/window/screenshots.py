@@ -78,12 +78,23 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         window.resize(*SIZE)
         window.show()
         try:
-            _open_and_check(window)
+            bridge, rig = window.context.bridge, window.context.selection.rig
+            assert rig is not None
+            bridge.open(rig, None)
+            _wait(lambda: bridge.state is EngineState.READY)
+            window.user_actions.check()
+            _wait(lambda: bridge.status is not None and bridge.status.check is not None)
             _measure(window, SHOWN_TOO, lambda: None)
             _measure(window, SHOWN, lambda: _picture(window, (RUN,), folder))
             _fill(window)
             _picture(window, tuple(name for name in window.pages if name != RUN), folder)
-            _picture_tabs(window, folder)
+            simulation = window.pages[SIMULATE]
+            assert isinstance(simulation, SimulatePage)
+            window.show_page(SIMULATE)
+            for view in (simulation.branches, simulation.chain):
+                simulation.tabs.setCurrentWidget(view)
+                _save(window, folder, view.kind.name)
+            simulation.tabs.setCurrentIndex(0)
             _picture_spectrogram(window, folder)
             for width, height in OTHER_SIZES:
                 window.resize(width, height)
@@ -94,15 +105,6 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
         finally:
             window.close()
     return 0
-
-
-def _open_and_check(window: Window) -> None:
-    bridge, rig = window.context.bridge, window.context.selection.rig
-    assert rig is not None
-    bridge.open(rig, None)
-    _wait(lambda: bridge.state is EngineState.READY)
-    window.user_actions.check()
-    _wait(lambda: bridge.status is not None and bridge.status.check is not None)
 
 
 def _measure(window: Window, measurement: Measurement, during: Callable[[], None]) -> None:
@@ -158,16 +160,6 @@ def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
         window.show_page(page)
         _save(window, folder, page.lower())
     _use_theme(window, first)
-
-
-def _picture_tabs(window: Window, folder: Path) -> None:
-    simulation = window.pages[SIMULATE]
-    assert isinstance(simulation, SimulatePage)
-    window.show_page(SIMULATE)
-    for view in (simulation.branches, simulation.chain):
-        simulation.tabs.setCurrentWidget(view)
-        _save(window, folder, view.kind.name)
-    simulation.tabs.setCurrentIndex(0)
 
 
 def _picture_spectrogram(window: Window, folder: Path) -> None:

@@ -160,7 +160,18 @@ def write(task: Task, volts: NDArray[np.float64], request: Any) -> Fields:
     elif task.is_running:
         _write_running(task, volts, deadline(request.timeout))
     else:
-        _write_stopped(task, volts)
+        buffer, count = task.output_buffer, volts.shape[1]
+        missing = buffer.written + count - buffer.size
+        if missing > 0 and not buffer.is_sized:
+            check_memory(buffer.size + missing, len(task.outputs))
+            buffer.grow(missing)
+        elif missing > 0:
+            detail = (
+                f"Buffer: {buffer.size} samples per channel; already written {buffer.written}, "
+                f"now {count} more"
+            )
+            raise DaqmxRefusal(DAQmxErrors.NO_MORE_SPACE, detail, samples_written=0)
+        buffer.write(volts)
         if request.auto_start:
             task.start()
     return {"samps_per_chan_written": volts.shape[1]}
@@ -175,20 +186,6 @@ def _write_on_demand(task: Task, volts: NDArray[np.float64], *, starts_task: boo
     for channel, row in zip(task.outputs, volts, strict=True):
         task.rig.world.silence(channel.physical)
         task.rig.world.play(channel.physical, row, channel.side.rates.maximum_hz)
-
-
-def _write_stopped(task: Task, volts: NDArray[np.float64]) -> None:
-    buffer, count = task.output_buffer, volts.shape[1]
-    missing = buffer.written + count - buffer.size
-    if missing > 0 and not buffer.is_sized:
-        check_memory(buffer.size + missing, len(task.outputs))
-        buffer.grow(missing)
-    elif missing > 0:
-        detail = (
-            f"Buffer: {buffer.size} samples per channel; already written {buffer.written}, now {count} more"
-        )
-        raise DaqmxRefusal(DAQmxErrors.NO_MORE_SPACE, detail, samples_written=0)
-    buffer.write(volts)
 
 
 def _write_running(task: Task, volts: NDArray[np.float64], deadline_s: float) -> None:

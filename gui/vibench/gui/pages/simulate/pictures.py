@@ -268,30 +268,27 @@ class AnswerPlots(QWidget):
 
     def _responses(self, progress: SimulationProgress) -> None:
         for number, model in enumerate(progress.models):
-            self._responses_of(progress, model, number)
+            if number == 0:
+                bands_hz = progress.collision_bands_hz(model)
+                self.responses.stripes(_COLLIDING).show_bands(bands_hz)
+                self.responses.rules(_EDGE).show_at(low_hz for low_hz, _ in bands_hz[1:])
+                if bands_hz:
+                    self.responses.upright(_EDGE, bands_hz[0][0], f"impacts, {model}")
+            elsewhere_hz, elsewhere = progress.other_motions(model)
+            if elsewhere_hz.size:
+                dots = self.responses.dots(curve_style(number), f"other starts, {model}", size=5)
+                dots.setData(elsewhere_hz, elsewhere)
+            for name, label, dash in (
+                ("response_i", "Response I", Dash.SOLID),
+                ("response_ii", "Response II", Dash.DOTTED),
+            ):
+                frequency_hz, values = progress.column(model, name)
+                if frequency_hz.size:
+                    line = self.responses.curve(curve_style(number, dash), f"{label}, {model}")
+                    line.setData(frequency_hz, values, connect="finite")
         low, high = progress.smallest_and_largest_response
         if high > 0.0:
             self.responses.setYRange(log10(low) - 0.1, log10(high) + 0.1, padding=0.0)
-
-    def _responses_of(self, progress: SimulationProgress, model: str, number: int) -> None:
-        if number == 0:
-            bands_hz = progress.collision_bands_hz(model)
-            self.responses.stripes(_COLLIDING).show_bands(bands_hz)
-            self.responses.rules(_EDGE).show_at(low_hz for low_hz, _ in bands_hz[1:])
-            if bands_hz:
-                self.responses.upright(_EDGE, bands_hz[0][0], f"impacts, {model}")
-        elsewhere_hz, elsewhere = progress.other_motions(model)
-        if elsewhere_hz.size:
-            dots = self.responses.dots(curve_style(number), f"other starts, {model}", size=5)
-            dots.setData(elsewhere_hz, elsewhere)
-        for name, label, dash in (
-            ("response_i", "Response I", Dash.SOLID),
-            ("response_ii", "Response II", Dash.DOTTED),
-        ):
-            frequency_hz, values = progress.column(model, name)
-            if frequency_hz.size:
-                line = self.responses.curve(curve_style(number, dash), f"{label}, {model}")
-                line.setData(frequency_hz, values, connect="finite")
 
     def _exponents(self, progress: SimulationProgress) -> None:
         for number, model in enumerate(progress.models):
