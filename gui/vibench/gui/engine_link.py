@@ -40,6 +40,7 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.plan import Campaign, Measurement, lead_in_s
 from vibench.acquisition.rig import KnobSheet, Rig
 from vibench.analysis.live import LiveChannel, LiveView
+from vibench.sim.background import ignore
 from vibench.stop_files import SWITCH_OFF
 
 from .background import in_next_pass
@@ -151,7 +152,7 @@ class EngineLine:
 
     def leave(self, how: Urgency = Urgency.END) -> None:
         """End the engine after a ramp-down, or leave the engine running; return without waiting."""
-        self._calls.put(_Call(how, next(self._numbers), _ignore, _ignore, _ignore))
+        self._calls.put(_Call(how, next(self._numbers), ignore, ignore, ignore))
 
     def close(self, how: Urgency = Urgency.END) -> None:
         """End the engine after a ramp-down, or leave the engine running; wait until this is done."""
@@ -181,10 +182,6 @@ class EngineLine:
             self._answers.put(lambda: call.on_refusal(refusal))
         else:
             self._answers.put(lambda: call.on_answer(answer))
-
-
-def _ignore(_: object) -> None:
-    """Ignore the engine's reply; the next status shows what a command has changed."""
 
 
 CATCH_UP_S = 2.0
@@ -306,7 +303,7 @@ class Bridge(QObject):
     def stop(self, level: StopLevel, reason: str) -> None:
         """Hold or end the run; the engine receives this request before all waiting requests."""
         if self._line is not None:
-            self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _ignore, self._report)
+            self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), ignore, self._report)
 
     @property
     def may_leave(self) -> bool:
@@ -337,7 +334,7 @@ class Bridge(QObject):
 
         def take_answer(answer: Any) -> None:
             end_order()
-            (on_answer or _ignore)(answer)
+            (on_answer or ignore)(answer)
 
         def take_refusal(error: AcquisitionError) -> None:
             end_order()

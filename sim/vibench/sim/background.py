@@ -65,8 +65,8 @@ Part = TypeVar("Part")
 Question = TypeVar("Question")
 
 
-def _ignore(*_: object) -> None:
-    pass
+def ignore(*_: object) -> None:
+    """Ignore an answer or an error."""
 
 
 @dataclass(eq=False)
@@ -83,7 +83,7 @@ class Job:
     """Whether the job's result or error has been delivered to the job's owner."""
     end_s: float = math.inf
     """Value of `monotonic` at which the process is killed if the job is still running [s]."""
-    cancel: Callable[[], None] = _ignore
+    cancel: Callable[[], None] = ignore
 
     @property
     def is_over(self) -> bool:
@@ -131,7 +131,7 @@ class Pool:
     ) -> Job:
         """Run ``function`` in a worker for at most ``longest_s``; then call ``on_answer`` or ``on_error``."""
         work = partial(_without_parts, partial(function, *args, **kwargs))
-        return self.begin(Job(work, _ignore, on_answer, on_error, self._longest_s))
+        return self.begin(Job(work, ignore, on_answer, on_error, self._longest_s))
 
     def stream(
         self,

@@ -13,7 +13,7 @@ from vibench.acquisition.campaign import (
     ReconnectingBench,
     estimate_campaign,
 )
-from vibench.acquisition.campaign._attempts import LOOK_EVERY_S
+from vibench.acquisition.campaign._run_campaign import LOOK_EVERY_S
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.stopping.stop import Cause, StopRequest

@@ -12,7 +12,13 @@ from vibench.acquisition import (
     run_campaign,
     run_measurement,
 )
-from vibench.acquisition.campaign import AfterFailure, ExistingRecordings, PointOutcome, _attempts, _opening
+from vibench.acquisition.campaign import (
+    AfterFailure,
+    ExistingRecordings,
+    PointOutcome,
+    _opening,
+    _run_campaign,
+)
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign, RunState
 from vibench.acquisition.recording import RecordingState
@@ -51,7 +57,7 @@ def test_a_complete_recording_can_be_moved_during_the_campaign(bench, tmp_path, 
             outcome.path.rename(tmp_path / "elsewhere.h5")
         return outcome
 
-    monkeypatch.setattr(_attempts, "run_measurement", measure_and_move)
+    monkeypatch.setattr(_run_campaign, "run_measurement", measure_and_move)
     point_results = run_campaign(bench, CAMPAIGN, tmp_path / "out")
     assert [each.outcome for each in point_results] == [PointOutcome.RECORDED] * 3
     monkeypatch.undo()

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import preview_measurement
-from vibench.acquisition.plan._measurement_preview import MOST_SAMPLES, SPECTRUM_POINTS
+from vibench.acquisition.plan._limits import MOST_SAMPLES, SPECTRUM_POINTS
 from vibench.acquisition.rig import load_rig
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -197,20 +197,22 @@ class CampaignProgress:
 
 
 @dataclass(frozen=True)
-class DonePoint:
-    """A point whose recording is complete."""
+class PlannedRecording:
+    """One planned recording of a campaign, with its path."""
 
     name: str
     measurement: Measurement
     path: Path
+    is_complete: bool = False
+    """Whether a complete recording of the same plan already exists."""
 
 
 @dataclass(frozen=True)
 class FinishedPoint:
     """Argument of the ``after`` callback: the point that was just measured, and all completed points."""
 
-    point: DonePoint
-    done: tuple[DonePoint, ...]
+    point: PlannedRecording
+    done: tuple[PlannedRecording, ...]
     """All completed points of this and earlier sessions in the order of the campaign, including ``point``."""
 
 
@@ -218,12 +220,8 @@ After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
 """Function called with the open recording after every point; it may return measurements to make next."""
 
 
-def ignore_campaign_progress(progress: CampaignProgress) -> None:
-    """Ignore the progress; the default for ``on_progress``."""
-
-
-def ignore_result(point_result: PointResult) -> None:
-    """Ignore the result; the default for ``on_result``."""
+def ignore_result(_: object) -> None:
+    """Ignore a result, an event or progress; the default of every listener."""
 
 
 # SQLite file of a journal: tables (see docs/campaigns.md), connections, and errors.

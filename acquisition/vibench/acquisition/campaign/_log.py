@@ -24,7 +24,7 @@ from ..host.beside import Beside, ClosedOnLeaving
 from ..host.printable import printable
 from ..host.toml_file import FrozenModel
 from ..plan import measuring_s
-from ._journal import CampaignProgress, JournalPoint, JournalPointState
+from ._journal import CampaignProgress, JournalPoint, JournalPointState, ignore_result
 
 
 class CampaignEventKind(StrEnum):
@@ -63,10 +63,7 @@ class CampaignEvent:
 
 CampaignListener = Callable[[CampaignEvent], None]
 """Function called with every event, in order; the function must not raise an exception."""
-
-
-def ignore_event(event: CampaignEvent) -> None:
-    """Ignore the event; the default for ``on_event``."""
+ignore_event: CampaignListener = ignore_result
 
 
 LOG_SUFFIX = ".log.jsonl"

@@ -36,6 +36,7 @@ from ._journal import (
     ExistingRecordings,
     Journal,
     JournalPointState,
+    PlannedRecording,
     ReasonCode,
     differences,
     journal_exists,
@@ -238,17 +239,6 @@ def _end_of_attempt(
 
 MOST_DIFFERENCES = 5
 """Largest number of differences listed in an error message."""
-
-
-@dataclass(frozen=True)
-class PlannedRecording:
-    """One planned recording of a campaign, with its path."""
-
-    name: str
-    measurement: Measurement
-    path: Path
-    is_complete: bool = False
-    """Whether a complete recording of the same plan already exists."""
 
 
 def rig_at(rig: Rig, measurement: Measurement) -> Rig:

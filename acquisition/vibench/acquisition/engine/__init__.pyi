@@ -1,13 +1,19 @@
 from ._client import (
+    AdoptedEngine as AdoptedEngine,
     Announcement as Announcement,
     Attendant as Attendant,
     EngineClient as EngineClient,
+    EngineProcess as EngineProcess,
+    StopDelivery as StopDelivery,
     announced_engines as announced_engines,
     out_of_reach as out_of_reach,
     programs_to_stop as programs_to_stop,
     programs_without_engine as programs_without_engine,
     require_ended as require_ended,
+    start_engine as start_engine,
+    stop_engine as stop_engine,
     the_engine as the_engine,
+    unattended_engine as unattended_engine,
 )
 from ._engine import (
     Engine as Engine,
@@ -21,14 +27,6 @@ from ._request_handler import (
 )
 from ._server import (
     serving as serving,
-)
-from ._start import (
-    AdoptedEngine as AdoptedEngine,
-    EngineProcess as EngineProcess,
-    StopDelivery as StopDelivery,
-    start_engine as start_engine,
-    stop_engine as stop_engine,
-    unattended_engine as unattended_engine,
 )
 from ._status import (
     DRIVING as DRIVING,

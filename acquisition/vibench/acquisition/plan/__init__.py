@@ -56,10 +56,13 @@ from ._campaign import (
 from ._limits import (
     LimitCheck as LimitCheck,
     LimitSide as LimitSide,
+    MeasurementPreview as MeasurementPreview,
     check_amplitude_vpp as check_amplitude_vpp,
     check_phases as check_phases,
     check_phasors as check_phasors,
     nearest_expected as nearest_expected,
+    preview_measurement as preview_measurement,
+    preview_signal as preview_signal,
     require_within_limits as require_within_limits,
     run_check_vpp as run_check_vpp,
     shortest_ramp_s as shortest_ramp_s,
@@ -69,11 +72,6 @@ from ._loads import (
     base_motion as base_motion,
     needed_vpp as needed_vpp,
     predicted_loads as predicted_loads,
-)
-from ._measurement_preview import (
-    MeasurementPreview as MeasurementPreview,
-    preview_measurement as preview_measurement,
-    preview_signal as preview_signal,
 )
 from ._schedule import (
     CHECK_FREQUENCY_HZ as CHECK_FREQUENCY_HZ,

@@ -27,7 +27,7 @@ from vibench.analysis.prediction.progress import (
     Trouble,
     settled_motion,
 )
-from vibench.sim.background import Job
+from vibench.sim.background import Job, ignore
 
 from ..forms.editor import Choice
 from ..forms.model_form import ValidatedForm
@@ -283,7 +283,8 @@ class MapsPage(Page):
     def add_recordings(self, paths: object) -> None:
         """Draw the base levels of recordings on the map, if they have a level over frequency."""
         for path in paths if isinstance(paths, (list, tuple)) else ():
-            self.context.background.ask(recorded_response, self._show_level, _ignore, Path(path))
+            # Ignore files without a level over frequency (noise, dwell); Compare reports unreadable files.
+            self.context.background.ask(recorded_response, self._show_level, ignore, Path(path))
 
     def _show_level(self, level: RecordedLevel) -> None:
         self._levels.append(level)
@@ -359,7 +360,3 @@ def _legend_entry(name: str, colour: str) -> str:
     """Return a coloured square and a name; a frame makes a square in the background's colour visible."""
     unbroken = name.replace(" ", "&nbsp;").replace("-", "&#8209;")
     return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
-
-
-def _ignore(_error: BaseException) -> None:
-    """Ignore files without a level over frequency (noise, dwell); Compare reports unreadable files."""
