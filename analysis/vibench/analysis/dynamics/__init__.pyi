@@ -32,11 +32,13 @@ from ._requests import (
     BranchRequest as BranchRequest,
     ChainDrive as ChainDrive,
     ChainRequest as ChainRequest,
-    ContactWord as ContactWord,
     ExponentSpectrum as ExponentSpectrum,
-    SpecimenChoice as SpecimenChoice,
     SpectrumPoint as SpectrumPoint,
     SpectrumRequest as SpectrumRequest,
     exponent_spectrum as exponent_spectrum,
     spectrum_points as spectrum_points,
+)
+from ._specimen_choice import (
+    ContactWord as ContactWord,
+    SpecimenChoice as SpecimenChoice,
 )
