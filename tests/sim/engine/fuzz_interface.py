@@ -70,12 +70,12 @@ def call(engine, draws):
     except ValueError:
         return -1
     if draws.random() < 0.5:
-        engine.invoke("start", tables, state, tolerance)
+        engine.start(tables, state, tolerance)
     kind = draws.integers(4)
     if kind == 3:
         return follow(engine, tables, state, tolerance, draws)
     if kind == 0:
-        return engine.invoke("run", tables, state, until, tolerance, record)
+        return engine.run(tables, state, until, tolerance, record)
     tangent, readings = engine.new("Tangent"), engine.new("Readings")
     tangent["changes"], tangent["rows"] = draws.integers(1, 7), np.eye(6)
     growth, impacts, motions = np.zeros(6 * 8), np.zeros(8, np.int64), np.zeros((8, 6))
@@ -86,9 +86,9 @@ def call(engine, draws):
         corrupt((tangent, readings)[draws.integers(2)], draws)
     readings["room"] = min(int(readings["room"]), 8)
     if kind == 1:
-        return engine.invoke("run", tables, state, until, tolerance, record, tangent)
+        return engine.run(tables, state, until, tolerance, record, tangent)
     last = int(draws.choice([-1, 0, 3, 8, 9]))
-    return engine.invoke("take_readings", tables, state, tolerance, record, tangent, readings, last)
+    return engine.take_readings(tables, state, tolerance, record, tangent, readings, last)
 
 
 def call_on_cubics(engine, draws):
@@ -123,8 +123,8 @@ def call_on_cubics(engine, draws):
     except ValueError:
         return -1
     if draws.random() < 0.8:
-        engine.invoke("start", tables, state, tolerance)
-    return engine.invoke("run_cubics", tables, state, drive, tolerance, record)
+        engine.start(tables, state, tolerance)
+    return engine.run_cubics(tables, state, drive, tolerance, record)
 
 
 def follow(engine, tables, state, tolerance, draws):

@@ -212,7 +212,7 @@ def chain_calls(engine, normal):
             collisions=collision_structure(engine).ctypes.data,
             power_shapes=power_structure(engine).ctypes.data,
             sample_rate=2e3,
-            memory=np.zeros(engine.invoke("chain_memory", cells, len(laws))),
+            memory=np.zeros(engine.chain_memory(cells, len(laws))),
             **numbers,
             **filled,
         )

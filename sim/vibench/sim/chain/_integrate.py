@@ -75,7 +75,7 @@ class ChainRun:
             impact_cells=self._places,
             peaks=self.peaks_m,
             lines=self._lines.view(np.float64),
-            memory=np.empty(engine.invoke("chain_memory", cells, len(tables.kinds))),
+            memory=np.empty(engine.chain_memory(cells, len(tables.kinds))),
         )
         fill_drive(self._motion["drive"], drive, chain.cells[0])
 

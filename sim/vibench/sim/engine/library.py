@@ -6,7 +6,7 @@ import importlib.util
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -79,20 +79,7 @@ FUNCTIONS = (
 """Functions of the native library that have a single structure as argument."""
 Tables = NDArray[np.float64]
 """Tables of a scene, prepared by the engine in the engine's memory layout."""
-_Pointer, _Number, _Count = ctypes.c_void_p, ctypes.c_double, ctypes.c_int64
-SIGNATURES: Mapping[str, tuple[type, ...]] = {
-    "structure": (ctypes.c_char_p, _Count),
-    **dict.fromkeys(("size_of", "size_of_tables", "size_of_cubic_tables"), (_Count, _Count)),
-    **dict.fromkeys(("prepare", "prepare_cubics"), (_Count, _Pointer, _Pointer)),
-    "start": (_Count, _Pointer, _Pointer, _Number),
-    "run": (_Count, _Pointer, _Pointer, _Number, _Number, _Pointer, _Pointer),
-    "run_cubics": (_Count, _Pointer, _Pointer, _Pointer, _Number, _Pointer),
-    "take_readings": (_Count, _Pointer, _Pointer, _Number, _Pointer, _Pointer, _Pointer, _Count),
-    "reach": (_Number, _Pointer, _Pointer),
-    "chain_memory": (_Count, _Count, _Count),
-    **dict.fromkeys(FUNCTIONS, (_Count, _Pointer)),
-}
-"""Types of the result and of the arguments of every function of the native library, by name."""
+_Pointer = ctypes.c_void_p
 
 
 class EngineError(RuntimeError):
@@ -110,19 +97,37 @@ class Engine:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        library = ctypes.CDLL(str(path))
-        self._functions = {name: getattr(library, f"vibench_{name}") for name in SIGNATURES}
-        for name, function in self._functions.items():
-            function.restype, *function.argtypes = SIGNATURES[name]
+        self._library = ctypes.CDLL(str(path))
+        self._declare("vibench_structure", ctypes.c_char_p, ctypes.c_int64)
+        self._declare("vibench_size_of", ctypes.c_int64, ctypes.c_int64)
+        self._declare("vibench_size_of_tables", ctypes.c_int64, ctypes.c_int64)
+        self._declare("vibench_prepare", ctypes.c_int64, _Pointer, _Pointer)
+        self._declare("vibench_start", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double)
+        number, count = ctypes.c_double, ctypes.c_int64
+        self._declare("vibench_size_of_cubic_tables", count, count)
+        self._declare("vibench_prepare_cubics", count, _Pointer, _Pointer)
+        self._declare("vibench_run_cubics", count, _Pointer, _Pointer, _Pointer, number, _Pointer)
+        filled = (_Pointer, _Pointer, _Pointer)
+        self._declare("vibench_run", count, _Pointer, _Pointer, number, number, *filled[:2])
+        self._declare("vibench_take_readings", count, _Pointer, _Pointer, number, *filled, count)
+        self._declare("vibench_reach", number, _Pointer, _Pointer)
+        self._declare("vibench_chain_memory", count, count, count)
+        for name in FUNCTIONS:
+            self._declare(f"vibench_{name}", count, _Pointer)
+        self._functions = {name: getattr(self._library, f"vibench_{name}") for name in FUNCTIONS}
         self._types = self._read_structures()
+
+    def _declare(self, name: str, result: type, *arguments: type) -> None:
+        function = getattr(self._library, name)
+        function.restype, function.argtypes = result, arguments
 
     def _read_structures(self) -> dict[str, StructureType]:
         texts: list[str] = []
-        while (text := self.invoke("structure", len(texts))) is not None:
+        while (text := self._library.vibench_structure(len(texts))) is not None:
             texts.append(text.decode())
         types = parse_structures(texts)
         for index, (name, of) in enumerate(types.items()):
-            size = self.invoke("size_of", index)
+            size = self._library.vibench_size_of(index)
             if size != of.itemsize:
                 raise EngineError(
                     f"{self.path} uses {size} bytes for {name}, but Python uses {of.itemsize}: run {REBUILD}."
@@ -155,23 +160,21 @@ class Engine:
         for field, value in fields.items():
             structure[field] = _pointer(value) if isinstance(value, np.ndarray) else value
 
-    def invoke(self, function: str, *arguments: NDArray[Any] | float | None) -> Any:
-        """Call a function of native/api.cpp, with arrays by address; return its result (-1 if refused)."""
-        return self._functions[function](
-            *(each.ctypes.data if isinstance(each, np.ndarray) else each for each in arguments)
-        )
-
     def call(self, function: str, structure: Structure) -> int:
         """Call a function of native/api.cpp with one structure, and return its result.
 
         Raises ValueError when the engine rejects the structure.
         """
-        code = int(self.invoke(function, structure))
+        code = int(self._functions[function](structure.ctypes.data))
         if code < 0:
             raise ValueError(
                 f"The native engine refuses to {function}: array sizes must agree and numbers must be finite."
             )
         return code
+
+    def chain_memory(self, cells: int, kinds: int) -> int:
+        """Return the size of a chain's work memory, in floats, for ``kinds`` different kinds of cells."""
+        return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
         """Return the tables of a scene. They point to the collision and step shapes: keep these shapes alive.
@@ -185,13 +188,62 @@ class Engine:
         return self._prepare("cubic_tables", "prepare_cubics", scene)
 
     def _prepare(self, sized: str, prepare: str, scene: Structure) -> Tables:
-        size = self.invoke(f"size_of_{sized}", int(scene["specimen"]["law"]))
+        size = getattr(self._library, f"vibench_size_of_{sized}")(int(scene["specimen"]["law"]))
         tables = np.zeros(size // 8, np.float64)
-        if self.invoke(prepare, scene, tables) != 0:
+        if getattr(self._library, f"vibench_{prepare}")(scene.ctypes.data, tables.ctypes.data) != 0:
             raise ValueError(
                 "This scene is not allowed: numbers must be finite, and masses and springs positive."
             )
         return tables
+
+    def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
+        """Store in ``state`` whether m1 is in contact; return 0, or -1 if the input is refused."""
+        return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
+
+    def run(
+        self,
+        tables: Tables,
+        state: Structure,
+        until_s: float,
+        tolerance: float,
+        record: Structure,
+        tangent: Structure | None = None,
+    ) -> int:
+        """Advance ``state`` and its ``tangent`` vectors to a time [s], and fill ``record``.
+
+        Return the number of an `Outcome`, or -1 if the input is refused.
+        """
+        run = (tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data)
+        return int(self._library.vibench_run(*run, None if tangent is None else tangent.ctypes.data))
+
+    def run_cubics(
+        self, tables: Tables, state: Structure, drive: Structure, tolerance: float, record: Structure
+    ) -> int:
+        """Advance ``state`` over the intervals of ``drive`` and fill ``record``; return the same as `run`."""
+        run = (tables.ctypes.data, state.ctypes.data, drive.ctypes.data, tolerance, record.ctypes.data)
+        return int(self._library.vibench_run_cubics(*run))
+
+    def take_readings(
+        self,
+        tables: Tables,
+        state: Structure,
+        tolerance: float,
+        record: Structure,
+        tangent: Structure,
+        readings: Structure,
+        last: int,
+    ) -> int:
+        """Advance to the end of interval ``last`` and fill ``readings``; return an outcome as `run` does."""
+        filled = (each.ctypes.data for each in (record, tangent, readings))
+        return int(
+            self._library.vibench_take_readings(
+                tables.ctypes.data, state.ctypes.data, tolerance, *filled, last
+            )
+        )
+
+    def reach(self, tables: Tables, state: Structure) -> float:
+        """Return a bound on abs(p) for all later times if no contact follows [m]; infinite in contact."""
+        return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
 
 
 def _pointer(numbers: NDArray[Any]) -> Structure | tuple[int, int]:

@@ -312,8 +312,8 @@ class NativeRun(_Run):
         left = int(record.structure["steps_left"])
         while True:
             record.structure["steps_left"] = allowed = next_slice(left, SLICE_STEPS)
-            code = self.engine.invoke(
-                "run", self._tables, self._state, until_s, self.tolerance, record.structure, tangent
+            code = self.engine.run(
+                self._tables, self._state, until_s, self.tolerance, record.structure, tangent
             )
             left -= allowed - int(record.structure["steps_left"])
             if code != Outcome.TOO_LONG or left <= 0:
@@ -333,8 +333,7 @@ class NativeRun(_Run):
 
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
         """Advance to the end of interval ``last``; add the growth of tangent vectors to ``readings``."""
-        code = self.engine.invoke(
-            "take_readings",
+        code = self.engine.take_readings(
             *(self._tables, self._state, self.tolerance, record.structure),
             *(self._tangent, readings.structure, last),
         )
@@ -360,7 +359,7 @@ class NativeRun(_Run):
     @property
     def reach_m(self) -> float:
         """Bound on abs(p) for all later times if no contact follows [m]; infinite in contact."""
-        return float(self.engine.invoke("reach", self._tables, self._state))
+        return self.engine.reach(self._tables, self._state)
 
 
 class GrowthReadings:
@@ -469,7 +468,7 @@ def start_at(
     """
     state["motion"] = motion
     refuse_inside_a_stop(state["motion"], specimen)
-    if engine.invoke("start", tables, state, tolerance) != 0:
+    if engine.start(tables, state, tolerance) != 0:
         raise ValueError(f"A tolerance of {tolerance} is not allowed: it must lie between 0 and 1.")
 
 
@@ -527,9 +526,7 @@ class CubicRun(_Run):
         return motions[:passed], impacts[:passed]
 
     def _run(self, drive: Structure, record: RunRecord) -> Outcome:
-        code = self._engine.invoke(
-            "run_cubics", self._tables, self._state, drive, self._tolerance, record.structure
-        )
+        code = self._engine.run_cubics(self._tables, self._state, drive, self._tolerance, record.structure)
         return outcome_of(code, "the run: start and end must be within its intervals")
 
 
