@@ -19,10 +19,11 @@ from ..periodic.balance_branch import (
     first_order_guesses,
     orbit_guess,
 )
-from ..periodic.branch import NEUTRAL, BifurcationKind, Branch, BranchEvent, OrbitShape
+from ..periodic.branch import BifurcationKind, Branch, BranchEvent, OrbitShape
 from ..periodic.branch_following import DrivePath, parameter_value
 from ..periodic.continuation import ArcEnd, ArcSteps
 from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet, structure_of
+from ..periodic.newton import NEUTRAL
 from ..periodic.orbit_branch import periodic_branch_within
 from ..periodic.restoring_force import PowerSpring, spring_of
 from ..periodic.shooting import PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit

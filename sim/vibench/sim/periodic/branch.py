@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Complex, Floats
 from .continuation import ArcEnd
-
-NEUTRAL = 1e-9
-"""Distance within which a multiplier counts as on the unit circle; without damping, many multipliers are."""
+from .newton import NEUTRAL
 
 
 class Parameter(StrEnum):

@@ -6,6 +6,9 @@ import numpy as np
 
 from ..specimen.specimen import Floats
 
+NEUTRAL = 1e-9
+"""Distance within which a multiplier counts as on the unit circle; without damping, many multipliers are."""
+
 
 def newton_iterates(
     image: Callable[[Floats], tuple[Floats, Floats]], state: Floats, scales: Floats, halvings: int = 0

@@ -29,10 +29,10 @@ from ..specimen.contact_laws import NoContact, PowerLaw, RigidStops
 from ..specimen.drive import Harmonic
 from ..specimen.specimen import Complex, Floats, Specimen, Y, Z, state_scales
 from ..specimen.stops import member
-from .branch import NEUTRAL, BifurcationKind, OrbitReport, OrbitShape, OrbitShapeWord, OrbitSigns
+from .branch import BifurcationKind, OrbitReport, OrbitShape, OrbitShapeWord, OrbitSigns
 from .floquet import multipliers
 from .harmonic_balance import phasors_of
-from .newton import newton_iterates, size_of
+from .newton import NEUTRAL, newton_iterates, size_of
 
 # Exact map of a state over a whole or half period, with derivatives. SI units.
 #

@@ -14,8 +14,7 @@ from itertools import islice
 import numpy as np
 
 from ..engine.run import Outcome, Watch
-from ..periodic.branch import NEUTRAL
-from ..periodic.newton import newton_iterates
+from ..periodic.newton import NEUTRAL, newton_iterates
 from ..specimen.specimen import Floats
 from .followed_run import (
     Block,
