@@ -280,11 +280,11 @@ class TangentCourse:
         )
 
 
-def follow_courses(courses: Sequence[TangentCourse], *, are_batched: bool = True) -> None:
+def follow_courses(courses: Sequence[TangentCourse]) -> None:
     """Integrate motions to their ends, alone or in SIMD batches if the specimen allows it."""
     alike = defaultdict[tuple[Specimen, float], list[TangentCourse]](list)
     for each in courses:
-        if are_batched and is_batchable(each.run.specimen, each.run.tolerance):
+        if is_batchable(each.run.specimen, each.run.tolerance):
             alike[each.run.specimen, each.run.tolerance].append(each)
         else:
             each.follow()

@@ -13,10 +13,6 @@ State = tuple[float, float, float, float, float, float]
 """x, y, z, vx, vy, vz in the inertial frame [m, m/s]."""
 
 
-RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
-"""Names of the four responses: Response I and II of x, then of p."""
-
-
 def state_of(values: Floats) -> State:
     """Return a state, shape (6,), as a tuple."""
     x, y, z, vx, vy, vz = (float(value) for value in values)

@@ -45,7 +45,7 @@ from .scene import PAPER_DURATION_S, Observable, Scene, Target
 from .several_starts import LEAST_SIZE, PARTED, SEED, pushes
 from .shares import student_quantile
 from .solve import Question, solve_closed_form
-from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, prediction_of
+from .stated_error import ROUNDED, ROUNDING, SAFETY, SIDES, error_per_period, with_errors
 
 LONGEST_S, OUT_OF_REACH_S = 60.0, 1e6
 """Default limit of the computing time, and expected time above which an error is out of reach [s]."""
@@ -665,18 +665,29 @@ class _Refinement:
         self, responses_m: Floats, errors: Floats, duration_s: float, window_s: float, impacts: int
     ) -> ScenePrediction:
         """Return a prediction with responses and errors; the caller sets the other fields."""
+        amplitude_m = self._scene.drive.amplitude_m
         is_free = never_touches(self._scene.specimen, self._motion)
-        return prediction_of(
-            self._scene,
-            responses_m,
-            errors,
-            impacts,
-            window_s,
+        response_i, response_ii, relative_i, relative_ii = (
+            None if math.isnan(each) else float(each) / amplitude_m for each in responses_m
+        )
+        found = ScenePrediction(
+            frequency_hz=self._frequency_hz,
+            amplitude_m=amplitude_m,
+            response_i=response_i,
+            response_ii=response_ii,
+            relative_i=relative_i,
+            relative_ii=relative_ii,
+            impacts=impacts,
+            impact_rate_hz=impacts / window_s if window_s > 0.0 else 0.0,
             motion=MotionKind.UNDECIDED,
             duration_s=duration_s,
+            window_s=window_s,
             ended="",
+            start=self._scene.start.name,
             final_state=state_of(self._main.motion),
             outcome=Outcome.REACHED_END,
             method=self._method,
+            accuracy=self._scene.accuracy.value,
             memory=StartMemory.KEPT if is_free else StartMemory.UNKNOWN,
         )
+        return with_errors(found, errors)

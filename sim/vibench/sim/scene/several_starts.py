@@ -19,7 +19,7 @@ from ..specimen.specimen import Floats, Specimen, Y, Z
 from .course import SceneRun
 from .followed_run import FollowedRun, Stretch, follow_with_section, observe_window, window_of
 from .plan import LinearMotion, never_touches
-from .prediction import RESPONSES, Ensemble, FoundMotion, MotionKind, StartMemory
+from .prediction import Ensemble, FoundMotion, MotionKind, StartMemory
 from .repetition import FEWEST_NEUTRAL, NEUTRAL, Growth, Pace, kind_of
 from .scatter import COVERED, WindowScatter, window_scatter
 from .scene import CLEAR, FEWEST, MOST, FixedDuration, Scene
@@ -413,7 +413,9 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
     """Return the responses of the first start if the motion repeats, otherwise their mean over the group."""
     shown = group[:1] if group[0].period is not None else group
     means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
-    return dict(zip(RESPONSES, map(float, means), strict=True))
+    return dict(
+        zip(("response_i", "response_ii", "relative_i", "relative_ii"), map(float, means), strict=True)
+    )
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:

@@ -43,9 +43,9 @@ from .stated_error import (
     UNKNOWN_ERRORS,
     StatedErrors,
     finite_or_none,
-    prediction_of,
     settled_errors,
     stated_errors,
+    with_errors,
 )
 from .states_alone import REMEMBERED, Follow, batches_are_worth_it, in_batches, one_by_one
 
@@ -97,7 +97,20 @@ def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWE
         from .refinement import refine_to_end  # noqa: PLC0415 - most scenes have no target
 
         return refine_to_end(scene)
-    return _solve_together([scene], question, are_batched=False)[0].prediction
+    method, motion = _plan(scene)
+    if method is Method.CLOSED_FORM:
+        return solve_closed_form(scene, motion, question)
+    begun = _StartedScene(scene, method, motion, question)
+    if begun.course.way is not None:
+        begun.course.way.follow()
+    chaos = begun.course.watch()
+    if chaos is not None:
+        chaos.follow()
+    seen = take_steps(begun.run, begun.course.observe())
+    exponent = begun.exponent(seen)
+    if exponent is not None:
+        exponent.course.follow()
+    return begun.answer(seen, exponent, one_by_one)
 
 
 def settle_scene(scene: Scene) -> ScenePrediction:
@@ -137,15 +150,14 @@ def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) 
     for scene in scenes:
         states = REMEMBERED * scene.duration.longest_s / FEWEST_TIMES * scene.drive.frequency_hz
         if together and held + states > MOST_HELD:
-            found += _solve_together(together, question, are_batched=True)
+            found += _solve_together(together, question)
             together, held = [], 0.0
         together.append(scene)
         held += states
-    return found + _solve_together(together, question, are_batched=True)
+    return found + _solve_together(together, question)
 
 
-def _solve_together(scenes: Sequence[Scene], question: Question, *, are_batched: bool) -> list[SolvedScene]:
-    follow = in_batches if are_batched else one_by_one
+def _solve_together(scenes: Sequence[Scene], question: Question) -> list[SolvedScene]:
     answers: dict[int, ScenePrediction] = {}
     begun: dict[int, _StartedScene] = {}
     taken_s = [0.0] * len(scenes)
@@ -158,7 +170,7 @@ def _solve_together(scenes: Sequence[Scene], question: Question, *, are_batched:
                 begun[place] = _StartedScene(scene, method, motion, question)
     ways = {place: each.course.way for place, each in begun.items() if each.course.way is not None}
     with _count_time(taken_s, ways):
-        follow([*ways.values()])
+        in_batches([*ways.values()])
     chaos = {}
     for place, each in begun.items():
         with _count_time(taken_s, [place]):
@@ -166,10 +178,10 @@ def _solve_together(scenes: Sequence[Scene], question: Question, *, are_batched:
         if followed_on is not None:
             chaos[place] = followed_on
     with _count_time(taken_s, chaos):
-        follow([*chaos.values()])
+        in_batches([*chaos.values()])
     with _count_time(taken_s, begun):
         steps = [each.course.observe() for each in begun.values()]
-        found = take_steps_of_all([each.run for each in begun.values()], steps, are_batched=are_batched)
+        found = take_steps_of_all([each.run for each in begun.values()], steps, are_batched=True)
     exponents = {
         place: exponent
         for (place, each), seen in zip(begun.items(), found, strict=True)
@@ -179,10 +191,10 @@ def _solve_together(scenes: Sequence[Scene], question: Question, *, are_batched:
         from ..exponents.tangent_run import follow_courses  # noqa: PLC0415 - as above
 
         with _count_time(taken_s, exponents):
-            follow_courses([each.course for each in exponents.values()], are_batched=are_batched)
+            follow_courses([each.course for each in exponents.values()])
     for (place, each), seen in zip(begun.items(), found, strict=True):
         with _count_time(taken_s, [place]):
-            answers[place] = each.answer(seen, exponents.get(place), follow)
+            answers[place] = each.answer(seen, exponents.get(place), in_batches)
     return [SolvedScene(answers[place], taken_s[place]) for place in range(len(scenes))]
 
 
@@ -245,7 +257,7 @@ def _plan(scene: Scene) -> tuple[Method, LinearMotion]:
 
 def solve_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
     """Return the prediction for a scene without contact, from the exact linear solution."""
-    period_s = 1.0 / scene.drive.frequency_hz
+    amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None
     match scene.duration:
         case FixedDuration(duration_s=duration_s, window_s=window_s):
@@ -254,35 +266,41 @@ def solve_closed_form(scene: Scene, motion: LinearMotion, question: Question) ->
             settled_s, window_s = motion.decay_time_s(DECAYED_SHARE), period_s
             duration_s = settled_s + period_s
             ended = "it repeats after 1 drive period(s)"
-    x, p = abs(motion.steady_x), abs(motion.steady_p)
+    x, p = abs(motion.steady_x) / amplitude, abs(motion.steady_p) / amplitude
     has_exponent = Observable.LYAPUNOV in scene.observe
-    found = prediction_of(
-        scene,
-        np.array([x, x, p, p]),
-        np.full(4, motion.transient_share(duration_s - window_s) + ROUNDING),
-        0,
-        window_s,
+    found = ScenePrediction(
+        frequency_hz=scene.drive.frequency_hz,
+        amplitude_m=amplitude,
+        response_i=x,
+        response_ii=x,
+        relative_i=p,
+        relative_ii=p,
+        impacts=0,
+        impact_rate_hz=0.0,
         motion=MotionKind.PERIODIC,
         period=1,
         duration_s=duration_s,
+        window_s=window_s,
         settled_s=settled_s,
         ended=ended,
         integration_error=0.0,
         scatter=0.0 if Observable.SCATTER in scene.observe else None,
         lyapunov_per_s=motion.slowest_rate if has_exponent else None,
         lyapunov_error_per_s=0.0 if has_exponent else None,
+        start=scene.start.name,
         final_state=state_of(motion.state(duration_s)),
         outcome=Outcome.REACHED_END,
         method=Method.CLOSED_FORM,
+        accuracy=scene.accuracy.value,
         memory=StartMemory.KEPT,
     )
+    found = with_errors(found, np.full(4, motion.transient_share(duration_s - window_s) + ROUNDING))
     if Observable.POINCARE in scene.observe:
         periods = whole_periods(duration_s, scene.drive.frequency_hz)
         count = whole_periods(window_s, scene.drive.frequency_hz)
         found = replace(found, section=np.tile(motion.state(periods * period_s), (count, 1)))
     if Observable.SPECTRUM in scene.observe:
-        lines = np.array([x]) / scene.drive.amplitude_m
-        found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=lines)
+        found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
     if question is Question.MOTION:
         # Like an integrated motion, end after a whole number of drive periods.
         duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
@@ -405,7 +423,7 @@ class _StartedScene:
         exponent: "LyapunovEstimate | None",
     ) -> ScenePrediction:
         """Return the prediction from the motion observed in the window."""
-        scene, run, window = self._scene, self.run, seen.window
+        scene, run, window, amplitude = self._scene, self.run, seen.window, self._scene.drive.amplitude_m
         is_whole = run.outcome is Outcome.REACHED_END
         drawn = _between_windows(seen) if is_whole and self._question is Question.ANSWER else None
         scatter = None if drawn is None else drawn.relative
@@ -417,35 +435,39 @@ class _StartedScene:
             rate, rate_error = float(rates.mean()), float(0.5 * np.ptp(rates))
         if Observable.SCATTER in scene.observe:
             scatter = None if ensemble is None else ensemble.scatter
-        found = prediction_of(
-            scene,
-            window.responses_m if is_whole else np.full(4, math.nan),
-            errors.stated,
-            window.impacts,
-            window.length_s,
+        found = ScenePrediction(
+            frequency_hz=scene.drive.frequency_hz,
+            amplitude_m=amplitude,
+            response_i=window.largest_x_m / amplitude if is_whole else None,
+            response_ii=abs(window.line_x_m) / amplitude if is_whole else None,
+            relative_i=window.largest_p_m / amplitude if is_whole else None,
+            relative_ii=abs(window.line_p_m) / amplitude if is_whole else None,
+            impacts=window.impacts,
+            impact_rate_hz=window.impacts / window.length_s if window.length_s > 0.0 else 0.0,
             motion=_final_kind(scene, seen, ensemble),
             period=None if seen.repeats is None else seen.repeats.period,
             duration_s=run.time_s,
+            window_s=window.length_s,
             settled_s=seen.settled_s,
             ended=_ending(seen, ensemble),
             integration_error=finite_or_none(errors.integration),
             scatter=scatter,
             lyapunov_per_s=rate,
             lyapunov_error_per_s=rate_error,
+            start=scene.start.name,
             final_state=state_of(run.motion),
             outcome=run.outcome,
             method=self._method,
+            accuracy=scene.accuracy.value,
             memory=memory,
             ensemble=ensemble if memory is StartMemory.LOST else None,
         )
-        found = found if exponent is None else _confirm_chaos(found, exponent)
+        found = with_errors(found if exponent is None else _confirm_chaos(found, exponent), errors.stated)
         if is_whole and Observable.POINCARE in scene.observe:
             found = replace(found, section=states_of(window.stretches))
         if is_whole and Observable.SPECTRUM in scene.observe:
             lines = spectrum_of(window)
-            found = replace(
-                found, spectrum_hz=lines.frequency_hz, spectrum=lines.amplitude_m / scene.drive.amplitude_m
-            )
+            found = replace(found, spectrum_hz=lines.frequency_hz, spectrum=lines.amplitude_m / amplitude)
         return found
 
 

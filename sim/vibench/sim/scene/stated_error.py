@@ -8,8 +8,7 @@ the window if the motion is stationary, otherwise from a few nearly equal starts
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from ..engine.run import Accuracy, Outcome, Watch
 from ..specimen.specimen import Floats
 from .course import FixedPoint, Lead, SceneRun
 from .followed_run import FollowedRun, ObservedWindow, observe_window
-from .prediction import RESPONSES, MotionKind, ScenePrediction
+from .prediction import MotionKind, ScenePrediction
 from .repetition import Pace
 from .scatter import draws_apart, draws_of_starts
 from .scene import AutomaticDuration, Scene
@@ -238,28 +237,16 @@ def _responses(run: FollowedRun, length_s: float) -> Floats:
     return np.array([seen.peak_x_m, scale * abs(seen.area_x), seen.peak_p_m, scale * abs(seen.area_p)])
 
 
-def prediction_of(
-    scene: Scene, responses_m: Floats, errors: Floats, impacts: int, window_s: float, **fields: Any
-) -> ScenePrediction:
-    """Return a prediction from the four responses [m] and their relative errors, shape (4,) each.
-
-    Unknown responses and errors are NaN. ``fields`` are the other fields of the prediction.
-    """
-    responses: dict[str, Any] = {}
-    numbers = (responses_m / scene.drive.amplitude_m).tolist(), errors.tolist()
-    for name, response, error in zip(RESPONSES, *numbers, strict=True):
-        responses |= {name: finite_or_none(response), f"{name}_error": finite_or_none(error)}
-    return ScenePrediction(
-        frequency_hz=scene.drive.frequency_hz,
-        amplitude_m=scene.drive.amplitude_m,
-        **responses,
-        error_estimate=finite_or_none(float(np.max(errors))),
-        impacts=impacts,
-        impact_rate_hz=impacts / window_s if window_s > 0.0 else 0.0,
-        window_s=window_s,
-        start=scene.start.name,
-        accuracy=scene.accuracy.value,
-        **fields,
+def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
+    """Return the prediction with the errors of its four responses, and the largest of these errors."""
+    response_i, response_ii, relative_i, relative_ii = (finite_or_none(float(error)) for error in stated)
+    return replace(
+        found,
+        response_i_error=response_i,
+        response_ii_error=response_ii,
+        relative_i_error=relative_i,
+        relative_ii_error=relative_ii,
+        error_estimate=finite_or_none(float(np.max(stated))),
     )
 
 
