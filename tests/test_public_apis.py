@@ -56,6 +56,7 @@ ONE_FILE_ROOMS = (
     "hdf5_files",
     "kinds",
     "rig",
+    "signals",
     "spectra",
     "stop_files",
     "tables",

@@ -25,7 +25,6 @@ from .periodic.branch import (
     Branch as Branch,
     BranchEvent as BranchEvent,
     OrbitShape as OrbitShape,
-    Parameter as Parameter,
 )
 from .periodic.branch_following import (
     AmplitudePath as AmplitudePath,
@@ -103,6 +102,7 @@ from .specimen.drive import (
     Harmonic as Harmonic,
     LinearSweep as LinearSweep,
     LogarithmicSweep as LogarithmicSweep,
+    Parameter as Parameter,
     Sampled as Sampled,
 )
 from .specimen.frozen_model import (

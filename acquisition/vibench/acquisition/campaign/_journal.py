@@ -220,8 +220,8 @@ After = Callable[[FinishedPoint, Recording], Iterable[Measurement]]
 """Function called with the open recording after every point; it may return measurements to make next."""
 
 
-def ignore_result(_: object) -> None:
-    """Ignore a result, an event or progress; the default of every listener."""
+def ignore_result(result: object) -> None:
+    """Ignore a ``result``, an event or progress; the default of every listener."""
 
 
 # SQLite file of a journal: tables (see docs/campaigns.md), connections, and errors.

@@ -13,7 +13,22 @@ from typing import Annotated, ClassVar, Self
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from vibench import sim
+from vibench.sim import (
+    Accuracy,
+    AmplitudePath,
+    BalanceOptions,
+    DrivePath,
+    FrequencyPath,
+    Harmonic,
+    HarmonicSet,
+    Parameter,
+    PhaseReference,
+    PowerLaw,
+    RigidStops,
+    SpecimenTable,
+    count_text,
+    lyapunov_spectrum,
+)
 from vibench.sim.branches import MotionSearch
 from vibench.sim.chain import MOST_CELLS, Chain
 from vibench.sim.study import TargetError, TargetTime, frequency_range
@@ -42,7 +57,7 @@ class BranchRequest(SpecimenChoice):
 
     method: BranchMethod = BranchMethod.SHOOTING
     """Shooting (exact), harmonic balance, or first order (one harmonic: eq. 5 of the paper)."""
-    along: sim.Parameter = sim.Parameter.FREQUENCY
+    along: Parameter = Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement when the frequency varies."""
@@ -70,7 +85,7 @@ class BranchRequest(SpecimenChoice):
     """Seed of the random initial states."""
     resonance_band_hz: tuple[PositiveFloat, PositiveFloat] | None = None
     """Two frequencies [Hz] around a mode whose phase resonance is followed while the amplitude varies."""
-    phase_of: sim.PhaseReference = sim.PhaseReference.RELATIVE
+    phase_of: PhaseReference = PhaseReference.RELATIVE
     """Motion of m0 that lags the base by a quarter of a period at the phase resonance."""
     loop_time_s: PositiveFloat | None = None
     """Latency of the bench's feedback loop [s], which limits the unstable motions that the bench can hold."""
@@ -84,12 +99,12 @@ class BranchRequest(SpecimenChoice):
                 f"the range {self.start:g} to {self.stop:g} does not ascend; give the lower value first"
             )
         law = self.chosen_specimen.contact
-        if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, sim.PowerLaw):
+        if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
             raise ValueError(
                 f"one harmonic cannot describe {self.law}: choose a power law such as power:5, or the "
                 "method 'balance' or 'shooting'"
             )
-        if self.method is BranchMethod.BALANCE and isinstance(law, sim.RigidStops):
+        if self.method is BranchMethod.BALANCE and isinstance(law, RigidStops):
             raise ValueError(
                 "harmonic balance needs a finite contact force, and rigid stops have none; choose "
                 "the method 'shooting'"
@@ -101,13 +116,13 @@ class BranchRequest(SpecimenChoice):
             )
         self._refuse_other_resonances()
         pairs = self.recorded_level
-        if pairs and self.along is sim.Parameter.AMPLITUDE:
+        if pairs and self.along is Parameter.AMPLITUDE:
             raise ValueError(
                 "a recorded level needs branches along frequency; along amplitude, give one frequency"
             )
         if pairs and (len(pairs) < 2 or not all(a[0] < b[0] for a, b in pairwise(pairs))):
             raise ValueError("a recorded level needs two or more ascending frequencies")
-        sim.Harmonic(*self.path.drive(self.stop))  # raises an error if the drive is impossible
+        Harmonic(*self.path.drive(self.stop))  # raises an error if the drive is impossible
         return self
 
     def _refuse_other_resonances(self) -> None:
@@ -118,21 +133,21 @@ class BranchRequest(SpecimenChoice):
             raise ValueError(f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; swap the two ends")
         lower, upper = self.chosen_specimen.gaps_m
         followed = self.along, self.method, self.time_s
-        if followed != (sim.Parameter.AMPLITUDE, BranchMethod.SHOOTING, None) or lower != upper:
+        if followed != (Parameter.AMPLITUDE, BranchMethod.SHOOTING, None) or lower != upper:
             raise ValueError(
                 "a phase resonance is followed along amplitude, by shooting, with two equal stops and no "
                 "time limit; give a range of amplitudes and a specimen with one gap, and leave out the time"
             )
 
     @property
-    def path(self) -> sim.DrivePath:
+    def path(self) -> DrivePath:
         """Path in frequency and amplitude along which branches are followed."""
-        if self.along is sim.Parameter.AMPLITUDE:
-            return sim.AmplitudePath(self.frequency_hz)
+        if self.along is Parameter.AMPLITUDE:
+            return AmplitudePath(self.frequency_hz)
         if self.recorded_level:
             frequencies_hz, amplitudes_m = zip(*self.recorded_level, strict=True)
-            return sim.FrequencyPath(amplitudes_m, frequencies_hz)
-        return sim.FrequencyPath((self.amplitude_m,))
+            return FrequencyPath(amplitudes_m, frequencies_hz)
+        return FrequencyPath((self.amplitude_m,))
 
     @property
     def search(self) -> MotionSearch:
@@ -146,12 +161,12 @@ class BranchRequest(SpecimenChoice):
         )
 
     @property
-    def balance_options(self) -> sim.BalanceOptions:
+    def balance_options(self) -> BalanceOptions:
         """Options of harmonic balance."""
         lower, upper = self.chosen_specimen.gaps_m
-        kept = sim.HarmonicSet.ODD if lower == upper else sim.HarmonicSet.ALL
+        kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
         most = 1 if self.method is BranchMethod.FIRST_ORDER else self.harmonics
-        return sim.BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=self.error or EXACT_ENOUGH)
+        return BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=self.error or EXACT_ENOUGH)
 
     @property
     def title(self) -> str:
@@ -160,7 +175,7 @@ class BranchRequest(SpecimenChoice):
         if self.resonance_band_hz is not None:
             low_hz, high_hz = self.resonance_band_hz
             return f"{self.law}, {self.phase_of.value} phase resonance between {low_hz:g} and {high_hz:g} Hz"
-        if self.along is sim.Parameter.AMPLITUDE:
+        if self.along is Parameter.AMPLITUDE:
             where = f"{self.frequency_hz:g} Hz"
         elif self.recorded_level:
             where = "recorded level"
@@ -197,7 +212,7 @@ class ChainDrive(StrEnum):
 class ChainRequest(SpecimenChoice):
     """A chain under one kind of drive; the repeating unit consists of the specimen and any `others`."""
 
-    others: tuple[sim.SpecimenTable, ...] = ()
+    others: tuple[SpecimenTable, ...] = ()
     """Further specimens in the unit of the chain, after the first."""
     lengths: Annotated[tuple[Annotated[int, Field(ge=1, le=MOST_CELLS)], ...], Field(min_length=1)] = (8,)
     """Number of cells; give several numbers to study chains of different lengths."""
@@ -219,7 +234,7 @@ class ChainRequest(SpecimenChoice):
     """Settling time from rest under a steady sine, before the observation."""
     exponent_s: NonNegativeFloat = 0.0
     """Averaging time of the largest Lyapunov exponent under a steady sine; 0 to omit the exponent."""
-    accuracy: sim.Accuracy = sim.Accuracy.STANDARD
+    accuracy: Accuracy = Accuracy.STANDARD
     """Accuracy of contacts; flight is exact at every accuracy."""
     error: TargetError | None = None
     """Target relative error of transmissions under a steady sine, such as 0.01 or "1 %"; determines the
@@ -230,7 +245,7 @@ class ChainRequest(SpecimenChoice):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         self.chain(max(self.lengths))
-        sim.Harmonic(self.start_hz, self.amplitude_m)  # raises an error if the drive is impossible
+        Harmonic(self.start_hz, self.amplitude_m)  # raises an error if the drive is impossible
         self._refuse_beside_target()
         if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
             raise ValueError(
@@ -282,7 +297,7 @@ class ChainRequest(SpecimenChoice):
     @property
     def title(self) -> str:
         """Title of the chain request for figures."""
-        cells = ", ".join([*map(str, self.lengths[:-1]), sim.count_text(self.lengths[-1], "cell")])
+        cells = ", ".join([*map(str, self.lengths[:-1]), count_text(self.lengths[-1], "cell")])
         match self.drive:
             case ChainDrive.NONE:
                 return f"{cells} without contact"
@@ -318,7 +333,7 @@ ELASTIC = ("hertz", "linear", "linear_gap", "power")
 class SpectrumRequest(SpecimenChoice):
     """Request for all Lyapunov exponents at every frequency or level."""
 
-    along: sim.Parameter = sim.Parameter.FREQUENCY
+    along: Parameter = Parameter.FREQUENCY
     """Parameter that varies: frequency or amplitude of the drive."""
     amplitude_m: PositiveFloat = 5e-6
     """Amplitude of the base displacement when the frequency varies."""
@@ -330,7 +345,7 @@ class SpectrumRequest(SpecimenChoice):
     """Upper end of the range of frequencies [Hz] or amplitudes [m]."""
     step: PositiveFloat = 10.0
     """Step between points of the range, in Hz or in m."""
-    accuracy: sim.Accuracy = sim.Accuracy.REFERENCE
+    accuracy: Accuracy = Accuracy.REFERENCE
     """Accuracy of contacts and of the sum of the exponents."""
     duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] = 25.0
     """Averaging time of the exponents."""
@@ -344,7 +359,7 @@ class SpectrumRequest(SpecimenChoice):
         points = len(self.values)
         if points > MOST_POINTS:
             raise ValueError(f"{points} points were requested; at most {MOST_POINTS}: take a larger step")
-        sim.Harmonic(*self.drive(self.stop))  # raises an error if the drive is impossible
+        Harmonic(*self.drive(self.stop))  # raises an error if the drive is impossible
         return self
 
     @property
@@ -354,7 +369,7 @@ class SpectrumRequest(SpecimenChoice):
 
     def drive(self, value: float) -> tuple[float, float]:
         """Return frequency [Hz] and amplitude [m] for a value of the varied parameter."""
-        if self.along is sim.Parameter.FREQUENCY:
+        if self.along is Parameter.FREQUENCY:
             return value, self.amplitude_m
         return self.frequency_hz, value
 
@@ -362,12 +377,12 @@ class SpectrumRequest(SpecimenChoice):
     def is_elastic(self) -> bool:
         """Whether the contact dissipates no energy."""
         law = self.chosen_specimen.contact
-        return isinstance(law, sim.PowerLaw) or law.kind in ELASTIC
+        return isinstance(law, PowerLaw) or law.kind in ELASTIC
 
     @property
     def title(self) -> str:
         """Title of the spectrum request for figures."""
-        is_level = self.along is sim.Parameter.AMPLITUDE
+        is_level = self.along is Parameter.AMPLITUDE
         fixed = f"{self.frequency_hz:g} Hz" if is_level else f"{1e6 * self.amplitude_m:g} µm"
         return f"{self.law}, {fixed}"
 
@@ -451,7 +466,7 @@ class ExponentSpectrum(Tabular):
         else:
             check = f"sums of exponents differ from the damping rate {self.points[0].dampers_per_s:.6g} 1/s "
             check += f"by at most {self.largest_sum_difference:.1g} of this value"
-        points = sim.count_text(len(self.points), "point")
+        points = count_text(len(self.points), "point")
         return f"{points} in {self.elapsed_s:.1f} s, {chaotic} chaotic while observed; {check}."
 
 
@@ -460,8 +475,8 @@ def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
     specimen = request.chosen_specimen
     for value in request.values:
         began = time.perf_counter()
-        drive = sim.Harmonic(*request.drive(value))
-        found = sim.lyapunov_spectrum(specimen, drive, request.accuracy, request.duration_s, request.settle_s)
+        drive = Harmonic(*request.drive(value))
+        found = lyapunov_spectrum(specimen, drive, request.accuracy, request.duration_s, request.settle_s)
         elapsed_s = time.perf_counter() - began
         low_per_s, high_per_s = found.intervals_per_s(request.confidence).T.tolist()
         dimension, low, high = found.dimension, *found.dimension_interval(request.confidence)

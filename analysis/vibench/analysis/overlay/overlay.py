@@ -9,9 +9,17 @@ from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 
-from vibench import sim
 from vibench.acquisition.plan import Approach, Measurement, base_motion
 from vibench.acquisition.rig import Rig
+from vibench.sim import (
+    Accuracy,
+    Harmonic,
+    Outcome,
+    Response,
+    Specimen,
+    base_transmissibility,
+    steady_response,
+)
 
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..frequency_response.results import FrequencyResponse
@@ -50,7 +58,7 @@ WINDOW_S = 5.0
 class ResponsePrediction(Tabular):
     """Responses of m0 to sines; arrays of shape (points,)."""
 
-    specimen: sim.Specimen
+    specimen: Specimen
     frequency_hz: Reals
     amplitude_m: Reals
     """Base amplitude A0 at each frequency."""
@@ -61,7 +69,7 @@ class ResponsePrediction(Tabular):
     """|x / U| of the linear model, without contact."""
     impacts: Integers
     """Number of impacts within the observed time."""
-    accuracy: sim.Accuracy
+    accuracy: Accuracy
     duration_s: float
     window_s: float
 
@@ -72,10 +80,10 @@ class ResponsePrediction(Tabular):
 
 
 def predict(
-    specimen: sim.Specimen,
+    specimen: Specimen,
     frequency_hz: Reals,
     amplitude_m: Reals | float,
-    accuracy: sim.Accuracy = sim.Accuracy.QUICK,
+    accuracy: Accuracy = Accuracy.QUICK,
     *,
     duration_s: float = PREDICTION_S,
     approach: Approach = Approach.REST,
@@ -93,12 +101,12 @@ def predict(
         Response I exceeds the error of every level.
     """
     amplitudes = np.broadcast_to(np.asarray(amplitude_m, dtype=np.float64), frequency_hz.shape)
-    drives = [sim.Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
+    drives = [Harmonic(float(f), float(a)) for f, a in zip(frequency_hz, amplitudes, strict=True)]
     # If a point starts from the previous point, half of the time is for settling after the frequency step.
     window_s = min(WINDOW_S, duration_s if approach is Approach.REST else duration_s / 2)
 
-    def point(drive: sim.Harmonic, state: Reals | None = None, for_s: float = duration_s) -> sim.Response:
-        return sim.steady_response(specimen, drive, accuracy, for_s, window_s, state)
+    def point(drive: Harmonic, state: Reals | None = None, for_s: float = duration_s) -> Response:
+        return steady_response(specimen, drive, accuracy, for_s, window_s, state)
 
     match approach:
         case Approach.REST:
@@ -108,14 +116,14 @@ def predict(
             points = list(_follow_points(point, drives, duration_s))
         case Approach.DOWN:
             points = list(_follow_points(point, drives[::-1], duration_s))[::-1]
-    ended = np.array([each.outcome is sim.Outcome.REACHED_END for each in points])
+    ended = np.array([each.outcome is Outcome.REACHED_END for each in points])
     return ResponsePrediction(
         specimen=specimen,
         frequency_hz=np.asarray(frequency_hz, dtype=np.float64),
         amplitude_m=amplitudes.copy(),
         response_i=np.where(ended, [each.response_i for each in points], np.nan),
         response_ii=np.where(ended, [each.response_ii for each in points], np.nan),
-        linear=np.abs(sim.base_transmissibility(specimen, frequency_hz)[:, 0]),
+        linear=np.abs(base_transmissibility(specimen, frequency_hz)[:, 0]),
         impacts=np.array([each.impacts for each in points], dtype=np.int64),
         accuracy=accuracy,
         duration_s=duration_s,
@@ -124,10 +132,10 @@ def predict(
 
 
 def _follow_points(
-    point: Callable[[sim.Harmonic, Reals | None, float], sim.Response],
-    drives: Sequence[sim.Harmonic],
+    point: Callable[[Harmonic, Reals | None, float], Response],
+    drives: Sequence[Harmonic],
     duration_s: float,
-) -> Iterator[sim.Response]:
+) -> Iterator[Response]:
     """Simulate each point from the final state of the previous one, with continuous drive phase.
 
     The first point starts from rest and has time to settle.
@@ -138,7 +146,7 @@ def _follow_points(
         found = point(replace(drive, phase_rad=2 * np.pi * turns), state, for_s)
         yield found
         turns = (turns + drive.frequency_hz * for_s) % 1.0
-        state = found.final_state if found.outcome is sim.Outcome.REACHED_END else None
+        state = found.final_state if found.outcome is Outcome.REACHED_END else None
 
 
 def paper_amplitude_m(amplitude_vpp: float) -> float | None:
@@ -282,7 +290,7 @@ def noise_overlay(analysis: NoiseAnalysis, drawn: DrawSet[NoiseResponse]) -> Noi
     )
 
 
-def prediction_grid(specimen: sim.Specimen, low_hz: float, high_hz: float) -> Reals:
+def prediction_grid(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
     """Return the frequencies of a prediction: every 2 Hz, and closer around narrow resonances."""
     coarse = np.arange(low_hz, high_hz + PREDICTION_STEP_HZ / 2, PREDICTION_STEP_HZ)
     near = np.arange(-PREDICTION_STEP_HZ, PREDICTION_STEP_HZ + _FINE_STEP_HZ / 2, _FINE_STEP_HZ)
@@ -409,7 +417,7 @@ def dwell_overlay(
             drawn.run.specimen,
             np.array([measured.drive.frequency_hz]),
             measured.drive.amplitude_m,
-            sim.Accuracy.STANDARD,
+            Accuracy.STANDARD,
         ),
     )
 

@@ -182,7 +182,7 @@ def _plain(value: float, _place: int | None = None) -> str:
 
 
 def with_prefix(largest: float, unit: str) -> tuple[float, str]:
-    """Return a factor that scales ``largest`` to between 1 and 1000, and the unit with its SI prefix."""
+    """Return a factor that scales ``largest`` [unit] to 1 ... 1000, and ``unit`` with its SI prefix."""
     fitting = [each for each in _PREFIXES if each[0] <= abs(largest)] or [_PREFIXES[0]]
     scale, prefix = fitting[-1]
     return 1 / scale, f"{prefix}{unit}"

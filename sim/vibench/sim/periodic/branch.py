@@ -9,22 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..specimen.drive import Harmonic
+from ..specimen.drive import Harmonic, Parameter
 from ..specimen.specimen import Complex, Floats
 from .continuation import ArcEnd
 from .newton import NEUTRAL
-
-
-class Parameter(StrEnum):
-    """Parameter along which a branch is followed."""
-
-    FREQUENCY = "frequency"
-    """Drive frequency [Hz]."""
-    AMPLITUDE = "amplitude"
-    """Drive amplitude [m]."""
-
-
-ParameterWord = Literal["frequency", "amplitude"]
 
 
 class BifurcationKind(StrEnum):

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 import scipy
 
-from ..specimen.drive import Harmonic
+from ..specimen.drive import Harmonic, Parameter
 from ..specimen.specimen import Floats
 from .branch import (
     POINTWISE,
@@ -18,7 +18,6 @@ from .branch import (
     BranchEvent,
     OrbitReport,
     OrbitSigns,
-    Parameter,
     bifurcations_between,
     is_joined,
     sign_of,

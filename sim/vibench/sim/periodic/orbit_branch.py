@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..specimen.drive import Harmonic
+from ..specimen.drive import Harmonic, Parameter, ParameterWord
 from ..specimen.specimen import Floats, state_scales
 from ..specimen.stops import member
-from .branch import Branch, OrbitReport, Parameter, ParameterWord
+from .branch import Branch, OrbitReport
 from .branch_following import (
     RANGE_LENGTH,
     AmplitudePath,

@@ -2,6 +2,8 @@
 
 import math
 from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +16,18 @@ SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e3
 """Allowed base amplitudes [m]. Squares of smaller values underflow; larger values must be typing errors."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
 """Allowed frequencies [Hz]. At higher frequencies, powers of frequency and numbers of periods overflow."""
+
+
+class Parameter(StrEnum):
+    """Parameter along which a branch is followed."""
+
+    FREQUENCY = "frequency"
+    """Drive frequency [Hz]."""
+    AMPLITUDE = "amplitude"
+    """Drive amplitude [m]."""
+
+
+ParameterWord = Literal["frequency", "amplitude"]
 
 
 @dataclass(frozen=True)
