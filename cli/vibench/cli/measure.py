@@ -127,16 +127,6 @@ def duration_s(text: str) -> float:
     return seconds
 
 
-def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Return the messengers for command and mail; raise ConfigurationError if a setting is wrong."""
-    found: list[Messenger] = []
-    if notify is not None:
-        found.append(CommandMessenger.of(notify))
-    if mail is not None:
-        found.append(MailMessenger(load_toml(mail.expanduser(), MailSettings)))
-    return tuple(found)
-
-
 def measure(
     campaign: Annotated[
         Path,
@@ -205,7 +195,12 @@ def measure(
         print_estimate(*estimate)
     if only_estimate:
         return
-    messengers = messengers_of(notify, mail)
+    found: list[Messenger] = []
+    if notify is not None:
+        found.append(CommandMessenger.of(notify))
+    if mail is not None:
+        found.append(MailMessenger(load_toml(mail.expanduser(), MailSettings)))
+    messengers = tuple(found)
     mover = None if move_beam is None else CommandMessenger.of(move_beam)
     request = CampaignRequest(
         campaign=plan,

@@ -25,7 +25,7 @@ from vibench.gui.forms.model_form import ValidatedForm
 from vibench.gui.forms.quantity_edit import QuantityEdit, parse_quantity, quantity_text
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.pages.test.test_page import TestForm as FormOfATest
-from vibench.gui.pages.test.test_preview import TestPreview as Previewed, preview_test
+from vibench.gui.pages.test.test_preview import preview_test
 from vibench.gui.plots.plot import Plot
 from vibench.gui.widgets.notice import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
 from vibench.gui.widgets.units import CHOICES, UNITS, prefixed_unit
@@ -54,7 +54,7 @@ def full_window(lasting_window, record, tmp_path_factory, wait_for):
     form = pages[TEST].form
     form.form.editors["excitation"].kind_choice.setCurrentText("held dwell")
     measurement = form.value
-    pages[TEST]._show_preview(preview_test(Previewed(measurement, rig)))
+    pages[TEST]._show_preview(preview_test((measurement, rig)))
     lines = ("base held at 5 µm", "stroke 0.05 mm of 5 mm", "acceleration 12.5 m/s² of 60 m/s²")
     armed = ArmedPlan(
         campaign="held",

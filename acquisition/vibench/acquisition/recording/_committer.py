@@ -211,9 +211,9 @@ class TableWriter:
 
     def replace(self, row: int, cells: Sequence[str | float]) -> Batch:
         """Return the writes that replace an existing row."""
-        columns = self._places.table.columns
+        columns = self._places.table.columns.values()
         writes = [
-            (offset + row * np.dtype(column.dtype).itemsize, cell(column, value).tobytes())
+            (offset + row * np.dtype(column).itemsize, cell(column, value).tobytes())
             for offset, column, value in zip(self._places.columns, columns, cells, strict=True)
         ]
         return Batch(writes=tuple(writes), counters={self._places.n_rows: self.rows})

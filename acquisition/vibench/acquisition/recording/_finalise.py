@@ -278,21 +278,21 @@ def _rows(source: h5py.File, table: Table, samples: int) -> Columns:
     if table is layout.EVENTS and tables.ending(source)[0] is RecordingState.RECORDING:
         last: tuple[str | float, ...] = (samples, time.time(), INTERRUPTED_KIND, INTERRUPTED_REASON)
         return {
-            column.name: np.append(columns[column.name], cell(column, value))
-            for column, value in zip(table.columns, last, strict=True)
+            name: np.append(columns[name], cell(column, value))
+            for (name, column), value in zip(table.columns.items(), last, strict=True)
         }
     return columns
 
 
 def _write_table(copy: h5py.File, table: Table, columns: Columns) -> None:
     group = copy.create_group(table.name)
-    rows = len(columns[table.columns[0].name])
+    rows = len(next(iter(columns.values())))
     scale = group.create_dataset(layout.ROW, data=np.arange(rows, dtype=layout.COUNT_DTYPE))
     scale.make_scale(layout.ROW)
     for column in table.columns:
-        dataset = group.create_dataset(column.name, shape=(rows,), dtype=_narrowest(columns[column.name]))
+        dataset = group.create_dataset(column, shape=(rows,), dtype=_narrowest(columns[column]))
         if rows:
-            dataset[:] = columns[column.name]
+            dataset[:] = columns[column]
         dataset.dims[0].attach_scale(scale)
 
 

@@ -78,50 +78,43 @@ class Origin(StrEnum):
     SIMULATED = "simulated"
 
 
-@dataclass(frozen=True)
-class Column:
-    """One column of a table, stored as a one-dimensional dataset of numbers or of fixed-length text."""
-
-    name: str
-    dtype: str
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table:
     """A group of equally long columns; ``capacity`` rows are pre-allocated while recording."""
 
     name: str
-    columns: tuple[Column, ...]
+    columns: Mapping[str, str]
+    """Type of each column, a one-dimensional dataset of numbers or of fixed-length text, by its name."""
     capacity: int
 
 
 EVENTS = Table(
     "events",
-    (
-        Column("sample", "<i8"),
-        Column("unix_time_s", "<f8"),
-        Column("kind", f"S{KIND_WIDTH}"),
-        Column("text", f"S{TEXT_WIDTH}"),
-    ),
+    {
+        "sample": "<i8",
+        "unix_time_s": "<f8",
+        "kind": f"S{KIND_WIDTH}",
+        "text": f"S{TEXT_WIDTH}",
+    },
     capacity=4096,
 )
 SEGMENTS = Table(
     "segments",
-    (
-        Column("first_sample", "<i8"),
-        Column("last_sample", "<i8"),
-        Column("is_complete", "<i4"),
-        Column("label", f"S{ROLE_WIDTH}"),
-        Column("numbers_json", f"S{NUMBERS_WIDTH}"),
-    ),
+    {
+        "first_sample": "<i8",
+        "last_sample": "<i8",
+        "is_complete": "<i4",
+        "label": f"S{ROLE_WIDTH}",
+        "numbers_json": f"S{NUMBERS_WIDTH}",
+    },
     capacity=4096,
 )
 OVERLOADS = Table(
     "overloads",
-    (Column("channel", f"S{ROLE_WIDTH}"), Column("first_sample", "<i8"), Column("last_sample", "<i8")),
+    {"channel": f"S{ROLE_WIDTH}", "first_sample": "<i8", "last_sample": "<i8"},
     capacity=8192,
 )
-GAPS = Table("gaps", (Column("first_sample", "<i8"), Column("last_sample", "<i8")), capacity=4096)
+GAPS = Table("gaps", {"first_sample": "<i8", "last_sample": "<i8"}, capacity=4096)
 TABLES = (EVENTS, SEGMENTS, OVERLOADS, GAPS)
 
 OPEN_SEGMENT = -1
@@ -175,9 +168,9 @@ def encode(text: str, width: int) -> bytes:
     return (raw[:room].decode("utf-8", "ignore") + ELLIPSIS).encode()
 
 
-def cell(column: Column, value: str | float) -> NDArray[np.generic]:
-    """Return a value as stored in a column, shape (1,)."""
-    dtype = np.dtype(column.dtype)
+def cell(column: str, value: str | float) -> NDArray[np.generic]:
+    """Return a value as stored in a column of this type, shape (1,)."""
+    dtype = np.dtype(column)
     return np.array([encode(value, dtype.itemsize) if isinstance(value, str) else value], dtype=dtype)
 
 

@@ -155,7 +155,7 @@ def _write_layout(file: h5py.File, header: RecordingHeader, capacity: int, reser
 def _table(file: h5py.File, table: Table) -> TablePlaces:
     group = file.create_group(table.name)
     n_rows = _fill(group, layout.N_ROWS, layout.COUNTER_DTYPE, b"\0" * 8)
-    columns = [_contiguous(group, each.name, each.dtype, table.capacity) for each in table.columns]
+    columns = [_contiguous(group, *each, table.capacity) for each in table.columns.items()]
     return TablePlaces(table, tuple(column.id.get_offset() for column in columns), n_rows)
 
 

@@ -13,7 +13,7 @@ from ..errors import RecordingError
 from . import _layout as layout
 from ._committer import Number
 from ._contents import json_object
-from ._layout import Column, RecordingState, Table, decode
+from ._layout import RecordingState, Table, decode
 
 Columns = dict[str, NDArray[Any]]
 
@@ -93,7 +93,7 @@ def read_columns(file: h5py.File, table: Table) -> Columns:
     group = file.get(table.name)
     if not isinstance(group, h5py.Group):
         raise RecordingError(f"the table {table.name} is missing")
-    datasets = [_column(group, table, column) for column in table.columns]
+    datasets = [_column(group, table, *column) for column in table.columns.items()]
     if layout.N_ROWS in group:
         rows = first_number(group, layout.N_ROWS)
         if not 0 <= rows <= min(len(each) for each in datasets):
@@ -102,11 +102,11 @@ def read_columns(file: h5py.File, table: Table) -> Columns:
         (rows, *others) = {len(each) for each in datasets}
         if others:
             raise RecordingError(f"the columns of the table {table.name} differ in length")
-    return {column.name: dataset[:rows] for column, dataset in zip(table.columns, datasets, strict=True)}
+    return {name: dataset[:rows] for name, dataset in zip(table.columns, datasets, strict=True)}
 
 
-def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
-    dataset, wanted = group.get(column.name), np.dtype(column.dtype)
+def _column(group: h5py.Group, table: Table, name: str, dtype: str) -> h5py.Dataset:
+    dataset, wanted = group.get(name), np.dtype(dtype)
     if (
         not isinstance(dataset, h5py.Dataset)
         or dataset.ndim != 1
@@ -115,7 +115,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
         or len(dataset) > table.capacity + 1  # a recovery adds one event to the table
     ):
         raise RecordingError(
-            f"the column {column.name} of the table {table.name} must have the type {column.dtype} and at "
+            f"the column {name} of the table {table.name} must have the type {dtype} and at "
             f"most {table.capacity + 1} rows"
         )
     return dataset
@@ -189,7 +189,7 @@ def clip(columns: Columns, table: Table, n_valid: int) -> Columns:
 
 def rows(columns: Columns, table: Table) -> Iterator[tuple[Any, ...]]:
     """Return an iterator over the rows of a table, as Python numbers and text."""
-    cells = (columns[column.name] for column in table.columns)
+    cells = (columns[name] for name in table.columns)
     return zip(
         *(map(decode, each) if each.dtype.kind == "S" else each.tolist() for each in cells), strict=True
     )

@@ -11,14 +11,14 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QSignalBlocker, Qt
-from PySide6.QtGui import QKeyEvent, QPaintEvent, QStandardItemModel, QWheelEvent
+from PySide6.QtGui import QKeyEvent, QStandardItemModel
 from PySide6.QtWidgets import QComboBox, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
 from vibench.acquisition import ChosenFrom, ConfigurationError
 from vibench.analysis.prediction.field_docstrings import field_docstring
 
 from ..widgets.units import CHOICES, UNITS
-from .quantity_edit import LineField, QuantityEdit, draw_edge, parse_quantity, quantity_text, unit_of
+from .quantity_edit import EdgedField, LineField, QuantityEdit, parse_quantity, quantity_text, unit_of
 
 _ENDINGS = (
     ("_m_per_s2", "m/s²"),
@@ -146,7 +146,7 @@ _LEFT_OPEN = "default"
 """Placeholder of an empty optional field."""
 
 
-class Choice(QComboBox):
+class Choice(EdgedField, QComboBox):
     """Combo box that ignores the space bar and, unless it has the focus, the mouse wheel.
 
     The space bar freezes the plots of the Run page. F4 and Alt+Down open the list. The width does not depend
@@ -176,18 +176,6 @@ class Choice(QComboBox):
             event.ignore()
         else:
             super().keyPressEvent(event)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the combo box, then its border."""
-        super().paintEvent(event)
-        draw_edge(self)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the mouse wheel unless the box has focus, so that scrolling the page changes no value."""
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
 
 
 class _LineOnEach(QStyledItemDelegate):

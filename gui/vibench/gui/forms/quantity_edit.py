@@ -3,6 +3,7 @@
 import re
 from decimal import Decimal
 from math import isfinite, log10
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QPainter, QPaintEvent, QPalette, QValidator, QWheelEvent
@@ -15,22 +16,28 @@ from ..widgets.units import AUTOMATIC, CHOICES, POWERS, STANDARD_GRAVITY, UNITS
 _ROUND = 2.0
 
 
-def draw_edge(field: QWidget) -> None:
-    """Draw a border around a field, after the style has drawn the field itself."""
-    role = QPalette.ColorRole.Highlight if field.hasFocus() else QPalette.ColorRole.Mid
-    painter = QPainter(field)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    painter.setPen(field.palette().color(role))
-    painter.drawRoundedRect(QRectF(field.rect()).adjusted(0.5, 0.5, -0.5, -0.5), _ROUND, _ROUND)
-
-
-class LineField(QLineEdit):
-    """A line of text with a border."""
+class EdgedField(QWidget if TYPE_CHECKING else object):  # type: ignore[misc] # a mix-in for Qt's fields
+    """A field with a border; only the focused field takes the mouse wheel, so scrolling changes no value."""
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the field, then its border."""
         super().paintEvent(event)
-        draw_edge(self)
+        role = QPalette.ColorRole.Highlight if self.hasFocus() else QPalette.ColorRole.Mid
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setPen(self.palette().color(role))
+        painter.drawRoundedRect(QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5), _ROUND, _ROUND)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Ignore the mouse wheel unless the field has focus, so that scrolling the page changes no value."""
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+
+class LineField(EdgedField, QLineEdit):
+    """A line of text with a border."""
 
 
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*$")
@@ -101,7 +108,7 @@ STEP = 0.05
 """Relative change of the value per press of an arrow key; such steps never reach zero."""
 
 
-class QuantityEdit(QAbstractSpinBox):
+class QuantityEdit(EdgedField, QAbstractSpinBox):
     """Field for a number in full precision; some fields may be empty.
 
     The value changes when typing is finished, not with every key.
@@ -166,18 +173,6 @@ class QuantityEdit(QAbstractSpinBox):
     def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
         """Accept every key; the text is read when typing is finished."""
         return QValidator.State.Acceptable, text, position
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Draw the field, then its border."""
-        super().paintEvent(event)
-        draw_edge(self)
-
-    def wheelEvent(self, event: QWheelEvent) -> None:
-        """Ignore the mouse wheel unless the field has focus, so that scrolling the page changes no value."""
-        if self.hasFocus():
-            super().wheelEvent(event)
-        else:
-            event.ignore()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Take a second Return as confirmation of the value; leaving the field does not confirm it."""

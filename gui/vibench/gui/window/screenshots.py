@@ -95,7 +95,15 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
                 simulation.tabs.setCurrentWidget(view)
                 _save(window, folder, view.kind.name)
             simulation.tabs.setCurrentIndex(0)
-            _picture_spectrogram(window, folder)
+            files = window.pages[FILES]
+            assert isinstance(files, FilesPage)
+            window.show_page(FILES)
+            files.pictures.setCurrentWidget(files.pictures.spectrogram)
+            files.pictures.spectrogram.spacing.setCurrentText(RowSpacing.LOGARITHMIC.value)
+            _pass_ms(STILL_MS)
+            _wait(lambda: not files.pictures.spectrogram.is_busy)
+            _save(window, folder, "files_spectrogram")
+            files.pictures.setCurrentWidget(files.time_histories)
             for width, height in OTHER_SIZES:
                 window.resize(width, height)
                 _picture(window, tuple(window.pages), folder / f"{width}x{height}")
@@ -160,18 +168,6 @@ def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
         window.show_page(page)
         _save(window, folder, page.lower())
     _use_theme(window, first)
-
-
-def _picture_spectrogram(window: Window, folder: Path) -> None:
-    files = window.pages[FILES]
-    assert isinstance(files, FilesPage)
-    window.show_page(FILES)
-    files.pictures.setCurrentWidget(files.pictures.spectrogram)
-    files.pictures.spectrogram.spacing.setCurrentText(RowSpacing.LOGARITHMIC.value)
-    _pass_ms(STILL_MS)
-    _wait(lambda: not files.pictures.spectrogram.is_busy)
-    _save(window, folder, "files_spectrogram")
-    files.pictures.setCurrentWidget(files.time_histories)
 
 
 def _save(window: Window, folder: Path, name: str) -> None:

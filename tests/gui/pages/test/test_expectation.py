@@ -21,7 +21,7 @@ def page(context):
 
 def test_the_expected_uncertainty_is_shown_below_the_prediction(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
-    page._on_result(preview.predict_test(preview.TestPreview(Measurement(name="weak", excitation=plan), RIG)))
+    page._on_result(preview.predict_test((Measurement(name="weak", excitation=plan), RIG)))
     assert page.expectation.text().startswith("Expected uncertainty: Response II: ± ")
     assert "Response I: not known beforehand" in page.expectation.toolTip()
     page._on_failure(ValueError("no"))
@@ -31,7 +31,7 @@ def test_the_expected_uncertainty_is_shown_below_the_prediction(page):
 def test_a_test_with_the_key_until_shows_its_predicted_time(page):
     plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=60)
     test = Measurement(name="weak", excitation=plan, until=Until(response_ii=0.01))
-    page._on_result(preview.predict_test(preview.TestPreview(test, RIG)))
+    page._on_result(preview.predict_test((test, RIG)))
     assert page.expectation.text().startswith("Records until the targets are met, about 2 s. Expected")
 
 
@@ -43,9 +43,7 @@ def test_a_branch_that_the_fast_loop_cannot_hold_is_refused_with_the_reason(page
     plan = fast_loop.BranchContinuation(
         amplitude_vpp=4, base_level=BaseLevel(displacement_m=1e-6), start_hz=95, low_hz=94.5, high_hz=96
     )
-    asked = preview.TestPreview(
-        Measurement(name="branch", excitation=plan), rig.model_copy(update={"specimen": RIG.specimen})
-    )
+    asked = (Measurement(name="branch", excitation=plan), rig.model_copy(update={"specimen": RIG.specimen}))
     page._show_preview(preview.preview_test(asked))
     assert page.is_done
     page._on_result(preview.predict_test(asked))
@@ -56,7 +54,7 @@ def test_a_branch_that_the_fast_loop_cannot_hold_is_refused_with_the_reason(page
 def test_every_exceeded_limit_is_among_the_reasons(page):
     """The reason "49 of 45 N" was missing when the stroke was exceeded too."""
     seen = preview.preview_test(
-        preview.TestPreview(
+        (
             Measurement(
                 name="loud", excitation=Dwell(amplitude_vpp=20, frequency_hz=30, settle_s=1, duration_s=2)
             ),
@@ -80,7 +78,7 @@ def test_the_prediction_is_not_repeated_when_a_test_is_renamed(page, qtbot):
     page.form.show_value(Measurement(name="after", excitation=plan))
     assert asked == []
     assert page.context.selection.measurement.name == "after"
-    page._show_preview(preview.preview_test(preview.TestPreview(page._inputs[0], RIG)))
+    page._show_preview(preview.preview_test((page._inputs[0], RIG)))
     assert not any(map(wrongly_enabled, page.displayed_results))
     assert page.is_done
     page.form.show_value(Measurement(name="after", excitation=plan.model_copy(update={"duration_s": 7.0})))

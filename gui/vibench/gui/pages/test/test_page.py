@@ -58,7 +58,7 @@ from ...widgets.notice import TEST, Notice, NoticeKind, clock
 from ...widgets.read_table import SHARE_ROLE, BarDelegate, ReadTable
 from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel, prefixed_unit
-from .test_preview import TestPrediction, TestPreview, predict_test, preview_test
+from .test_preview import TestPrediction, predict_test, preview_test
 
 if TYPE_CHECKING:
     from vibench.analysis import MeasurementPrediction
@@ -449,9 +449,9 @@ class TestPage(Page):
             self.summary.setText(f"✖ {what}")
             return
         self.summary.setText("…")
-        self._looking.ask(TestPreview(measurement, rig))
+        self._looking.ask((measurement, rig))
         self.prediction_note.setText("◌ simulating")
-        self._predicting.ask(TestPreview(measurement, rig))
+        self._predicting.ask((measurement, rig))
 
     def _show_preview(self, seen: MeasurementPreview) -> None:
         self._preview = seen

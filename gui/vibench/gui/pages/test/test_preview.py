@@ -12,17 +12,13 @@ if TYPE_CHECKING:
     from vibench.analysis import ExpectedResult, MeasurementPrediction
 
 
-@dataclass(frozen=True)
-class TestPreview:
-    """A test, and the rig on which it will run."""
-
-    measurement: Measurement
-    rig: Rig
+TestRequest = tuple[Measurement, Rig]
+"""A test, and the rig on which it will run."""
 
 
-def preview_test(test: TestPreview) -> MeasurementPreview:
+def preview_test(request: TestRequest) -> MeasurementPreview:
     """Return signal, loads, duration and file size of a test."""
-    return preview_measurement(test.measurement, test.rig)
+    return preview_measurement(*request)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,16 +33,16 @@ class TestPrediction:
     """Why feedback control on this rig cannot stabilise the motion; empty if feedback can do this."""
 
 
-def predict_test(test: TestPreview) -> TestPrediction:
+def predict_test(request: TestRequest) -> TestPrediction:
     """Simulate the response of the specimen, and predict uncertainty and recording time."""
-    refusal = ""
+    (measurement, rig), refusal = request, ""
     try:
-        test.measurement.excitation.require_holdable(test.rig)
+        measurement.excitation.require_holdable(rig)
     except AcquisitionError as error:
         refusal = f"{error}"
     return TestPrediction(
-        vibench.analysis.predict_measurement(test.measurement, test.rig),
-        vibench.analysis.expected_uncertainty(test.measurement, test.rig),
-        vibench.analysis.expected_recorded_s(test.measurement, test.rig),
+        vibench.analysis.predict_measurement(measurement, rig),
+        vibench.analysis.expected_uncertainty(measurement, rig),
+        vibench.analysis.expected_recorded_s(measurement, rig),
         refusal,
     )
