@@ -13,12 +13,12 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
     "acquisition": 26_560,
-    "analysis": 32_917,
-    "cli": 4_874,
+    "analysis": 32_644,
+    "cli": 4_875,
     "extensions": 3_354,
     "gui": 11_764,
     "native": 6_874,
-    "sim": 20_696,
+    "sim": 20_702,
     "studies": 2_920,
     "virtual_rig": 6_503,
 }
@@ -118,4 +118,4 @@ def test_a_package_stays_within_its_line_budget(folder):
     ]
     lines = sum(path.read_text(encoding="utf-8").count("\n") for path in sources)
     assert 0 < lines <= LINES_AT_MOST[folder]
-    assert sum(LINES_AT_MOST.values()) <= 116_666
+    assert sum(LINES_AT_MOST.values()) <= 116_196

@@ -5,12 +5,13 @@ from vibench.sim import (
     Accuracy,
     FrequencyPath,
     Harmonic,
+    Parameter,
     gong2025,
     integrate,
     periodic_branch,
     periodic_orbit,
 )
-from vibench.sim.periodic.branch import BifurcationKind, OrbitShape, Parameter
+from vibench.sim.periodic.branch import BifurcationKind, OrbitShape
 from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic.orbit_branch import periodic_branch_within
 from vibench.sim.specimen.specimen import state_scales
