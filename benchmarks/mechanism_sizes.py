@@ -43,7 +43,7 @@ MECHANISMS = {
         [SIM + "background.py", "gui/*/background.py", *EXECUTORS],
     ),
     "commands and options": (["cli/*"], ["cli/*"]),
-    "results and reports": (RESULTS, RESULTS),
+    "results, figures and reports": ([*RESULTS, ANALYSIS + "figures/*"], RESULTS),
     "AFG1022 driver": (AFG, AFG),
     "all drivers": ([DRIVERS + "*"], [DRIVERS + "*", MORE + "[!v]*"]),
     "virtual instruments": (INSTRUMENTS, [*INSTRUMENTS, MORE + "virtual_*"]),
