@@ -9,14 +9,13 @@ bytes at known offsets are written, so that no crash can leave the file inconsis
 
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Self
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from ..hdf5_files import open_hdf5_to_write
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
@@ -24,7 +23,7 @@ from . import _grid as layout
 from ._errors import StudyError
 from ._executor import software
 from ._results import offsets_of, read_arrays, read_plan, read_sessions
-from ._store import Arrays, PointAnswer, write_cells
+from ._store import MemoryStore
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
 """Longest wait for a reader to close the file, and time between attempts to lock the file [s]."""
@@ -190,10 +189,11 @@ def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> N
                 target.attrs[name] = value
 
 
-class FileStore:
+class FileStore(MemoryStore):
     """A store that writes to the file of a study; used as a context manager, it closes the file.
 
-    Raises StudyError when the file contains no study or another study, or is being written by another run.
+    Raises StudyError when the file contains no study or another study, or is being written by another run;
+    also after a write error, when earlier results are safe.
     """
 
     def __init__(
@@ -205,9 +205,9 @@ class FileStore:
         try:
             _require_same(path, read_plan(path, type(plan)), plan)
             self.arrays = read_arrays(path, plan)
-            """All results that the file contains."""
             self._offsets = offsets_of(path, plan)
             self._session = min(len(read_sessions(path, type(plan))), layout.MOST_SESSIONS - 1)
+            self._own_cells = {layout.SESSION: self._session}
         except BaseException:
             self._disk.close()
             raise
@@ -223,37 +223,10 @@ class FileStore:
         texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
         for (name, width), text in zip(layout.SESSION_COLUMNS.items(), texts, strict=True):
             raw = text.encode()[:width].ljust(width, b"\0")
-            self._write(self._offsets[f"{layout.SESSIONS}/{name}"] + self._session * width, raw)
+            self._write(f"{layout.SESSIONS}/{name}", self._session * width, raw)
         self._sync()
         counter = np.asarray(self._session + 1, dtype=layout.COUNTER_DTYPE)
-        self._write(self._offsets[f"{layout.SESSIONS}/{layout.N_SESSIONS}"], counter.tobytes())
-        self._sync()
-
-    def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Write the results of points: first their numbers, then the point states.
-
-        Raises StudyError after a write error; earlier results are safe.
-        """
-        for answer in answers:
-            cells = {**answer.cells, layout.SESSION: self._session}
-            kept = PointAnswer(answer.number, answer.state, cells)
-            for column, raw in write_cells(self.arrays, self._plan, kept):
-                if column.name in self._offsets:  # files of earlier versions have no digests
-                    self._write(self._offsets[column.name] + answer.number * len(raw), raw)
-        self._sync()
-        for answer in answers:
-            self._write(self._offsets[layout.STATE] + answer.number, bytes([answer.state]))
-            self.arrays[layout.STATE][answer.number] = answer.state
-        self._sync()
-
-    def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Write the filled-in points of a map as whole columns: first numbers, then point states."""
-        for name, values in cells.items():
-            self.arrays[name][numbers] = values
-            self._write(self._offsets[name], self.arrays[name].tobytes())
-        self._sync()
-        self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
-        self._write(self._offsets[layout.STATE], self.arrays[layout.STATE].tobytes())
+        self._write(f"{layout.SESSIONS}/{layout.N_SESSIONS}", 0, counter.tobytes())
         self._sync()
 
     def close(self) -> None:
@@ -266,9 +239,11 @@ class FileStore:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _write(self, offset: int, raw: bytes) -> None:
+    def _write(self, name: str, offset: int, raw: bytes) -> None:
+        if name not in self._offsets:  # files of earlier versions have no digests
+            return
         try:
-            self._disk.write(offset, raw)
+            self._disk.write(self._offsets[name] + offset, raw)
         except OSError as error:
             raise self._write_error(error) from error
 

@@ -1,9 +1,9 @@
-"""Interface of the stores that receive the results of a running study, and the store in memory."""
+"""Store in memory for the results of a running study, and conversion of predictions to its values."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,44 +68,48 @@ def states(arrays: Mapping[str, NDArray[np.generic]]) -> NDArray[np.uint8]:
     return np.asarray(arrays[layout.STATE], dtype=np.uint8)
 
 
-class Store(Protocol):
-    """Store of results; points that already have a result are not computed again."""
-
-    @property
-    def arrays(self) -> Arrays:
-        """Results stored so far; do not change them."""
-
-    def begin(self, executor: str) -> None:
-        """Record the start of a session, with the description of the session's executor."""
-
-    def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store the results of points; return once the results are safe."""
-
-    def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
-        """Store the interpolated points of a map, given by column, with the point state FILLED."""
-
-
 class MemoryStore:
-    """A store that keeps the results in memory."""
+    """A store that keeps results in memory; points that already have a result are not computed again."""
 
     def __init__(self, plan: layout.GridPlan) -> None:
         self.arrays, self._plan = empty_arrays(plan), plan
+        """Results stored so far; do not change them."""
+        self._own_cells: dict[str, layout.Cell] = {}
+        """Values that the store adds to every result."""
 
     def begin(self, executor: str) -> None:
-        """Do nothing, because a store in memory has no sessions."""
+        """Record the start of a session, with the executor's description; a memory has no sessions."""
 
     def keep(self, answers: Sequence[PointAnswer]) -> None:
-        """Store the results of points in memory."""
+        """Store the results of points, first their numbers, then the states; return once they are safe."""
         for answer in answers:
-            for _ in write_cells(self.arrays, self._plan, answer):
-                pass
+            whole = replace(answer, cells={**answer.cells, **self._own_cells})
+            for column, raw in write_cells(self.arrays, self._plan, whole):
+                self._write(column.name, answer.number * len(raw), raw)
+        self._sync()
+        for answer in answers:
+            self._write(layout.STATE, answer.number, bytes([answer.state]))
             self.arrays[layout.STATE][answer.number] = answer.state
+        self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
         """Store the interpolated points of a map, given by column, with the point state FILLED."""
-        for name, values in cells.items():
-            self.arrays[name][numbers] = values
-        self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
+        filled = np.full(len(numbers), layout.PointState.FILLED, np.uint8)
+        for part in (cells, {layout.STATE: filled}):
+            for name, values in part.items():
+                self.arrays[name][numbers] = values
+                self._write(name, 0, self.arrays[name].tobytes())
+            self._sync()
+
+    def _write(self, name: str, offset: int, raw: bytes) -> None:
+        """Write bytes at an offset in a dataset of the file, if there is a file."""
+
+    def _sync(self) -> None:
+        """Wait until all written bytes are on the disk."""
+
+
+Store = MemoryStore
+"""Any store of results: in memory or, derived from it, in a file."""
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, layout.Cell]:
