@@ -2,7 +2,7 @@ from dataclasses import replace
 
 from vibench.sim import Accuracy, Harmonic, Observable, Rest, Scene, gong2025
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Given
-from vibench.sim.study._solve import scene_identity
+from vibench.sim.study._study import scene_identity
 
 SCENE = Scene(
     gong2025(), Harmonic(260.0, 5e-6), (Observable.RESPONSE,), Accuracy.STANDARD, FixedDuration(), Rest()

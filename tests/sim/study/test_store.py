@@ -23,7 +23,7 @@ from vibench.sim.study import (
 from vibench.sim.study._file_store import FileStore, make_file, sole_writer
 from vibench.sim.study._grid import COLUMNS, IDENTITY, NUMBERS, SESSION, STATE
 from vibench.sim.study._queue import StudyEnd
-from vibench.sim.study._solve import scene_identity
+from vibench.sim.study._study import scene_identity
 
 from .conftest import SHORT
 

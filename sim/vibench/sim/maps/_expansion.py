@@ -10,17 +10,15 @@ from numpy.typing import NDArray
 from ..engine.batch import batches_pay
 from ..engine.run import Outcome
 from ..scene.cost import pilot_cost_s
-from ..scene.prediction import MotionKind, state_of
+from ..scene.prediction import MotionKind, ScenePrediction
 from ..scene.refinement import LONGEST_S
-from ..scene.scene import Given, Scene
-from ..scene.solve import InBatches, Question, SolvedScene, settle_scene, solve_scene
+from ..scene.scene import Scene
+from ..scene.solve import InBatches, Question, settle_scene, solve_scene
 from ..study import (
-    NUMBERS,
     Arrays,
     Cell,
     Grid,
     InvalidStudy,
-    PointAnswer,
     Points,
     PointState,
     Solver,
@@ -54,8 +52,6 @@ def map_solver(plan: Map) -> Solver:
 class MapPoints(Points):
     """Points of a map, converted to scenes."""
 
-    bundle_s = BUNDLE_S
-
     def __init__(self, plan: Map) -> None:
         # Refuse random starts with given starts here, not in `Map`, because older files may have both.
         of_start = [each.field for each in plan.varying if each in START]
@@ -64,9 +60,8 @@ class MapPoints(Points):
                 f"random_starts = {plan.random_starts} was given with a range of {of_start[-1]}, which sets "
                 "the start; leave out random_starts, or give ranges of drive or specimen alone."
             )
-        super().__init__(plan.grid, plan.chain, map_solver(plan))
+        super().__init__(plan, plan.chain, map_solver(plan), BUNDLE_S)
         self.plan = plan
-        self._kept = {column.name for column in plan.columns}
 
     @property
     def first_points(self) -> NDArray[np.int64]:
@@ -82,41 +77,15 @@ class MapPoints(Points):
             return np.arange(self.grid.size)
         return points_of(refinement_of(self.plan, arrays).missing, self.grid)
 
-    def new_scene(self, number: int) -> Scene:
-        """Return the scene of a point that starts from the plan's initial state."""
-        return self.plan.scene(self.grid.place(number))
-
-    def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point that starts from the final state of the point ``before``."""
-        place = self.grid.place(number)
-        state = state_of(arrays["final_state"][before].astype(np.float64))
-        start = Given(state, self.plan.start_labels[place[-2]])
-        return self.plan.scene(place, start, self.plan.phase_after(before, arrays))
-
-    def answer(self, number: int, scene: Scene, solved: SolvedScene, arrays: Arrays) -> PointAnswer:
-        """Return the values to store for the solution of a point."""
-        found = solved.prediction
-        numbers = {column.name: getattr(found, name) for name, column in NUMBERS.items()}
-        cells: dict[str, Cell] = {
-            name: value for name, value in numbers.items() if name in self._kept and value is not None
-        }
-        cells |= {
-            "motion": list(MotionKind).index(found.motion),
-            "outcome": int(found.outcome),
-            "final_state": found.final_state,
-            "drive_phase": scene.drive.phase_rad,
-            "continues": self.predecessor(number, arrays),
-            "taken": solved.taken_s,
-            **section_cells(found),
-        }
+    def own_cells(self, scene: Scene, found: ScenePrediction) -> dict[str, Cell]:
+        """Return section points, contact energy and the reason for an early end."""
+        cells = section_cells(found)
         energy_j = contact_energy_j(scene.specimen, found)
         if energy_j is not None:
             cells["contact_energy"] = energy_j
-        if found.outcome is Outcome.REACHED_END:
-            return PointAnswer(number, PointState.DONE, cells, solved.taken_s)
-        return PointAnswer(
-            number, PointState.STOPPED, {**cells, "message": found.outcome.text.encode()}, solved.taken_s
-        )
+        if found.outcome is not Outcome.REACHED_END:
+            cells["message"] = found.outcome.text.encode()
+        return cells
 
 
 def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:

@@ -434,6 +434,14 @@ class Map(GridPlan):
             target=self.target,
         )
 
+    def first_scene(self, place: tuple[int, ...]) -> Scene:
+        """Return the scene at a grid position, from the plan's initial state."""
+        return self.scene(place)
+
+    def label_after(self, place: tuple[int, ...], before: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Return the name of the initial state of a point that continues another point."""
+        return self.start_labels[place[-2]]
+
     def frequency_at(self, place: tuple[int, ...]) -> float:
         """Return the drive frequency at a position of the grid [Hz]."""
         return float(self._numbers(place)["frequency_hz"])

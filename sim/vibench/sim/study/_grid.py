@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..engine.run import Outcome
 from ..scene.prediction import Method, MotionKind, StartMemory
+from ..scene.scene import Given, Scene
 from ..specimen.frozen_model import FrozenModel
 
 FORMAT = "vibench-study"
@@ -293,6 +294,21 @@ class GridPlan(FrozenModel, ABC):
             if column.name not in (DIGEST, STATE):
                 found.update(arrays[column.name][number : number + 1].tobytes())
         return found.hexdigest()[:IDENTITY_DIGITS].encode()
+
+    @abstractmethod
+    def scene(self, place: tuple[int, ...], start: Given, phase_rad: float = 0.0) -> Scene:
+        """Return the scene at a position of the grid, from a given initial state.
+
+        Raises ValueError when a scene with these values is not allowed.
+        """
+
+    @abstractmethod
+    def first_scene(self, place: tuple[int, ...]) -> Scene:
+        """Return the scene at a position of the grid that continues no other point."""
+
+    @abstractmethod
+    def label_after(self, place: tuple[int, ...], before: tuple[int, ...]) -> str:
+        """Return the name of the initial state of a point that continues the point at ``before``."""
 
     @abstractmethod
     def frequency_at(self, place: tuple[int, ...]) -> float:

@@ -3,7 +3,6 @@
 import heapq
 import math
 import time
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from enum import StrEnum
 from functools import cached_property
@@ -12,14 +11,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import Cancelled, Observer, Progress
+from ..engine.run import Outcome
 from ..scene.cost import expected_cost_s
-from ..scene.scene import Scene
+from ..scene.prediction import ScenePrediction, state_of
+from ..scene.scene import Given, Scene
 from ..scene.solve import InBatches, SolvedScene, Solver
 from ..specimen.specimen import Floats
 from ._executor import Bundle, Executor, Reply
-from ._grid import FINAL_STATE, MESSAGE, TAKEN, Grid, PointState
-from ._store import Arrays, PointAnswer, Store, cut_text, is_failed, states
-from ._study import Start
+from ._grid import (
+    CONTINUES,
+    FINAL_STATE,
+    IDENTITY,
+    MESSAGE,
+    PHASE,
+    TAKEN,
+    Cell,
+    Grid,
+    GridPlan,
+    PointState,
+)
+from ._store import Arrays, PointAnswer, Store, cells_of, cut_text, is_failed, states
+from ._study import Start, scene_identity
 
 # If a point continues another point, it is ready when that other point is done. Of all ready points, the
 # point with the longest estimated computing time is started first. This time is estimated from the plan, and
@@ -213,14 +225,16 @@ PLANNED = 2000
 several neighbours."""
 
 
-class Points(ABC):
-    """Points of a plan: their scenes, created on demand, and the selection of the points to compute."""
+class Points:
+    """Points of a plan: their scenes, created on demand, and the selection of the points to compute.
 
-    bundle_s: float
-    """Largest planned computing time of a bundle [s]."""
+    ``bundle_s`` is the largest planned computing time of a bundle [s].
+    """
 
-    def __init__(self, grid: Grid, starts: Sequence[object], solver: Solver) -> None:
-        self.grid, self._starts, self._solver = grid, starts, solver
+    def __init__(self, plan: GridPlan, starts: Sequence[object], solver: Solver, bundle_s: float) -> None:
+        self.bundle_s = bundle_s
+        self._plan, self.grid, self._starts, self._solver = plan, plan.grid, starts, solver
+        self._kept = {column.name for column in plan.columns}
         self.share = BATCHED_SHARE if isinstance(solver, InBatches) else SHARE
 
     @cached_property
@@ -269,29 +283,46 @@ class Points(ABC):
         If that point has no finite final state, the scene has the plan's start instead. Raises ValueError
         when a scene with these values is not allowed.
         """
-        before = self.predecessor(number, arrays)
-        return self.new_scene(number) if before == NOBODY else self.next_scene(number, before, arrays)
+        before, place = self.predecessor(number, arrays), self.grid.place(number)
+        if before == NOBODY:
+            return self._plan.first_scene(place)
+        state = state_of(arrays[FINAL_STATE][before].astype(np.float64))
+        start = Given(state, self._plan.label_after(place, self.grid.place(before)))
+        return self._plan.scene(place, start, self._plan.phase_after(before, arrays))
+
+    def new_scene(self, number: int) -> Scene:
+        """Return the scene of a point that continues no other point."""
+        return self._plan.first_scene(self.grid.place(number))
+
+    def answer(self, number: int, scene: Scene, solved: SolvedScene, arrays: Arrays) -> PointAnswer:
+        """Return the result to store for the solution of a point."""
+        found, before = solved.prediction, self.predecessor(number, arrays)
+        cells: dict[str, Cell] = {
+            **cells_of(found),
+            CONTINUES: before,
+            PHASE: scene.drive.phase_rad,
+            TAKEN: solved.taken_s,
+            **self.own_cells(scene, found),
+        }
+        if IDENTITY in self._kept:
+            known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
+            cells[IDENTITY] = scene_identity(scene, known).encode()
+        state = PointState.DONE if found.outcome is Outcome.REACHED_END else PointState.STOPPED
+        kept = {name: cell for name, cell in cells.items() if name in self._kept}
+        return PointAnswer(number, state, kept, solved.taken_s)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
         """Return the result to store for a scene that raised an error."""
         message = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
         return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(message)})
 
-    @abstractmethod
-    def next_points(self, arrays: Arrays) -> NDArray[np.int64]:
+    def next_points(self, arrays: Arrays) -> NDArray[np.int64]:  # noqa: ARG002 - the same for all results
         """Return the points to compute next, given the results so far; called when these are complete."""
+        return np.arange(self.grid.size)
 
-    @abstractmethod
-    def new_scene(self, number: int) -> Scene:
-        """Return the scene of a point that continues no other point."""
-
-    @abstractmethod
-    def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point that continues the point ``before``."""
-
-    @abstractmethod
-    def answer(self, number: int, scene: Scene, solved: SolvedScene, arrays: Arrays) -> PointAnswer:
-        """Return the result to store for the solution of a point."""
+    def own_cells(self, scene: Scene, found: ScenePrediction) -> dict[str, Cell]:  # noqa: ARG002
+        """Return the values to store that only this kind of plan has, for the solution of a point."""
+        return {}
 
 
 def run_points(

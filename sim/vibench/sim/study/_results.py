@@ -34,7 +34,6 @@ from ._study import (
     GivenStart,
     Start,
     Study,
-    start_name,
 )
 
 if TYPE_CHECKING:
@@ -327,7 +326,7 @@ class StudyResults(GridResults[Study]):
             case GivenStart():
                 name = start.label
             case _ if before >= 0:
-                name = start_name(frequencies_hz[self.study.grid.place(before)[-1]])
+                name = self.study.label_after(place, self.study.grid.place(before))
             case _:
                 name = Start.REST.value
         return prediction_at(

@@ -6,26 +6,18 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from ..background import Cancelled, Observer
-from ..engine.run import Outcome
 from ..scene.cost import pilot_cost_s
-from ..scene.prediction import state_of
-from ..scene.scene import Given, Scene
-from ..scene.solve import SolvedScene, solve_scene
+from ..scene.solve import solve_scene
 from ..specimen.stops import member
 from ._errors import ClusterLost
 from ._executor import Executor, Solver, ThreadExecutor
-from ._grid import CONTINUES, FINAL_STATE, IDENTITY, PHASE, TAKEN, Cell, GridPlan, PointState
-from ._queue import NOBODY, Points, StudyEnd, run_points
+from ._grid import GridPlan
+from ._queue import Points, StudyEnd, run_points
 from ._results import StudyResults, open_study, results_of
-from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of
+from ._store import MemoryStore, Store
 from ._study import (
     Study,
-    scene_identity,
-    start_name,
     study_solver,
 )
 
@@ -34,42 +26,9 @@ BUNDLE_S, LANES_S = 0.05, 6.0
 the milliseconds of a transfer on a cluster."""
 
 
-class Expansion(Points):
-    """Points of a study: their scenes, and the results to store."""
-
-    def __init__(self, study: Study) -> None:
-        super().__init__(study.grid, study.starts, study_solver(study))
-        self._study = study
-        self.bundle_s = BUNDLE_S if self._solver is solve_scene else LANES_S
-
-    def next_points(self, arrays: Arrays) -> NDArray[np.int64]:
-        """Return the numbers of all points of the study."""
-        return np.arange(len(arrays[FINAL_STATE]))
-
-    def new_scene(self, number: int) -> Scene:
-        """Return the scene of a point that continues no other point."""
-        return self._study.first_scene(self.grid.place(number))
-
-    def next_scene(self, number: int, before: int, arrays: Arrays) -> Scene:
-        """Return the scene of a point that continues the point ``before``."""
-        name = start_name(self._study.frequency_at(self.grid.place(before)))
-        start = Given(state_of(arrays[FINAL_STATE][before].astype(np.float64)), name)
-        return self._study.scene(self.grid.place(number), start, self._study.phase_after(before, arrays))
-
-    def answer(self, number: int, scene: Scene, solved: SolvedScene, arrays: Arrays) -> PointAnswer:
-        """Return the result to store for a solved point, with the start and the digest of its scene."""
-        before = self.predecessor(number, arrays)
-        known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
-        cells: dict[str, Cell] = {
-            **cells_of(solved.prediction),
-            CONTINUES: before,
-            PHASE: scene.drive.phase_rad,
-            IDENTITY: scene_identity(scene, known).encode(),
-            TAKEN: solved.taken_s,
-        }
-        is_at_end = solved.prediction.outcome == Outcome.REACHED_END
-        state = PointState.DONE if is_at_end else PointState.STOPPED
-        return PointAnswer(number, state, cells, solved.taken_s)
+def _points(study: Study) -> Points:
+    solver = study_solver(study)
+    return Points(study, study.starts, solver, BUNDLE_S if solver is solve_scene else LANES_S)
 
 
 def planned_work_s(study: Study) -> float:
@@ -82,7 +41,7 @@ def planned_work_s(study: Study) -> float:
     >>> 0.0 < planned_work_s(study) < 60.0
     True
     """
-    points = Expansion(study)
+    points = _points(study)
     if study.target is not None:
         return points.grid.size * pilot_cost_s(points.new_scene, points.grid.size)
     return float(points.planned_s.sum())
@@ -194,4 +153,4 @@ def run_study(
     cancelled
         Function that is called between results and returns True to end the run.
     """
-    return run_points(Expansion(study), executor, store, observer, cancelled)
+    return run_points(_points(study), executor, store, observer, cancelled)

@@ -311,6 +311,10 @@ class Study(GridPlan):
         start = self.starts[place[-2]]
         return self.scene(place, Given(start.state, start.label) if isinstance(start, GivenStart) else Rest())
 
+    def label_after(self, place: tuple[int, ...], before: tuple[int, ...]) -> str:  # noqa: ARG002
+        """Return the name of an initial state taken from the final state at another frequency."""
+        return f"end at {self.frequency_at(before):g} Hz"
+
     def frequency_at(self, place: tuple[int, ...]) -> float:
         """Return the drive frequency at a position of the grid [Hz]."""
         return self.frequencies_hz[place[-1]]
@@ -333,11 +337,6 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
     if values is None:
         return StudyAxis(name, (AS_DESCRIBED,), "", long_name)
     return StudyAxis(name, values, units, long_name)
-
-
-def start_name(frequency_hz: float) -> str:
-    """Return the name of an initial state taken from the final state at this frequency [Hz]."""
-    return f"end at {frequency_hz:g} Hz"
 
 
 OTHER_STARTS = 8
