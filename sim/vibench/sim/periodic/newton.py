@@ -19,10 +19,8 @@ def newton_iterates(
     ----------
     image
         Map of a state over a period, and its Jacobian; NaN where the map is not defined.
-    state
-        Initial guess, shape (6,).
-    scales
-        Scale of each state variable, shape (6,).
+    state, scales
+        Initial guess, and scale of each state variable, shape (6,) each.
     halvings
         Number of step lengths to try, each half as long, until the closure error falls; if it does not fall,
         the iteration ends. 0 to take every step.

@@ -13,7 +13,6 @@ from typing import ClassVar, Literal
 from .stops import (
     PAPER_INDENTATION_M,
     LawWord,
-    Reference,
     Stops,
     Strict,
     UnreadableLawError,
@@ -235,29 +234,29 @@ def fit_power_law(
     return PowerLaw(gap_m + indentation_m, tuple(terms))
 
 
-def _parse_hertz(detail: str, reference: Reference) -> Hertz:
+def _parse_hertz(detail: str, stiffness: float, _gap_m: float) -> Hertz:
     require_nothing(detail)
-    return Hertz(reference.stiffness)
+    return Hertz(stiffness)
 
 
-def _parse_hunt_crossley(detail: str, reference: Reference) -> HuntCrossley:
-    return HuntCrossley(reference.stiffness, number_in(detail))
+def _parse_hunt_crossley(detail: str, stiffness: float, _gap_m: float) -> HuntCrossley:
+    return HuntCrossley(stiffness, number_in(detail))
 
 
-def _parse_linear_gap(detail: str, reference: Reference) -> LinearGap:
-    return LinearGap(number_in(detail)) if detail else fit_linear_gap(reference.stiffness)
+def _parse_linear_gap(detail: str, stiffness: float, _gap_m: float) -> LinearGap:
+    return LinearGap(number_in(detail)) if detail else fit_linear_gap(stiffness)
 
 
-def _parse_rigid_stops(detail: str, _reference: Reference) -> RigidStops:
+def _parse_rigid_stops(detail: str, _stiffness: float, _gap_m: float) -> RigidStops:
     return RigidStops(number_in(detail))
 
 
-def _parse_no_contact(detail: str, _reference: Reference) -> NoContact:
+def _parse_no_contact(detail: str, _stiffness: float, _gap_m: float) -> NoContact:
     require_nothing(detail)
     return NoContact()
 
 
-def _parse_power_law(detail: str, reference: Reference) -> PowerLaw:
+def _parse_power_law(detail: str, stiffness: float, gap_m: float) -> PowerLaw:
     """Return the law for ``3+5+7`` (equal shares) or ``3@0.2+7@0.8``; ``:`` and an indentation may follow."""
     powers, _, indentation = detail.partition(":")
     terms = [term.partition("@") for term in powers.split("+")]
@@ -268,7 +267,7 @@ def _parse_power_law(detail: str, reference: Reference) -> PowerLaw:
     is_equal = all(share == "" for _, _, share in terms)
     shares = None if is_equal else [number_in(share) for _, _, share in terms]
     at_m = number_in(indentation) if indentation else PAPER_INDENTATION_M
-    return fit_power_law(exponents, reference.stiffness, reference.gap_m, at_m, shares)
+    return fit_power_law(exponents, stiffness, gap_m, at_m, shares)
 
 
 ContactLaw = Hertz | NoContact | LinearGap | HuntCrossley | RigidStops | PowerLaw
@@ -308,11 +307,11 @@ def law_by_name(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw
     contact_stiffness, gap_m
         Hertz contact to which laws without explicit numbers are fitted: k_contact [N/m^1.5] and gap [m].
     """
-    reference = Reference(contact_stiffness, gap_m)
+    require_positive("Contact stiffness", contact_stiffness, "N/m^1.5")
     name, _, detail = text.strip().partition(":")
     if name in CONTACT_LAWS:
         try:
-            return CONTACT_LAWS[name].made(detail, reference)
+            return CONTACT_LAWS[name].made(detail, contact_stiffness, gap_m)
         except UnreadableLawError:
             pass
     *forms, last = (law.form for law in CONTACT_LAWS.values())

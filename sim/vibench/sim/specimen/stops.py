@@ -47,18 +47,6 @@ class Stops(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Reference:
-    """Hertz contact and clearance to which a law without explicit numbers is fitted."""
-
-    stiffness: float
-    """Hertz contact stiffness k_contact [N/m^1.5]."""
-    gap_m: float
-
-    def __post_init__(self) -> None:
-        require_positive("Contact stiffness", self.stiffness, "N/m^1.5")
-
-
-@dataclass(frozen=True)
 class LawWord(Generic[Law_co]):
     """Entry of `CONTACT_LAWS`: form of a law's name, and the function that parses it."""
 
@@ -68,8 +56,9 @@ class LawWord(Generic[Law_co]):
     """Short description of the law, as lists show it."""
     example: str
     """Example of the law's name, as figures show it."""
-    made: Callable[[str, Reference], Law_co]
-    """Function that returns the law for the text after the colon; raises `UnreadableLawError`."""
+    made: Callable[[str, float, float], Law_co]
+    """Function that returns the law for the text after the colon; raises `UnreadableLawError`. The other two
+    arguments are those of `law_by_name`: stiffness and clearance of the Hertz contact."""
 
 
 class UnreadableLawError(ValueError):
