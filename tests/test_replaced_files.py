@@ -82,7 +82,7 @@ NO_FILE_OF_A_USER = {
     "dirs_exist_ok=True)": "a site is built again",
     "_log.py: path.open('a', encoding='utf-8')": "a log grows by whole lines",
     "_log.py: self._path.open('a', encoding='utf-8')": "likewise",
-    "style.py: self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)": "memory",
+    "_style.py: self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)": "memory",
     "screenshots.py: small.save(str(path), None, _SMALLEST_FILE)": "made again with the documents",
     "_file_store.py: path.open('xb')": "claims the name while the file is made",
     "tasks.py: self._path.write_bytes(b'')": "the laboratory's converter writes it, as the real one does",
